@@ -1,0 +1,60 @@
+//! A dictionary: L atoms of M values, and what the Lasso needs of it over and over.
+
+use super::CodingError;
+use faer::Mat;
+
+/// A learnt dictionary D with its Gram matrix.
+#[derive(Clone, Debug)]
+pub struct Dictionary {
+    atoms: Mat<f64>,
+    gram: Mat<f64>,
+}
+
+impl Dictionary {
+    /// Takes D (M × L, one atom per column, ‖d_j‖ ≤ 1 up to rounding, all finite) and computes DᵀD.
+    pub fn new(atoms: Mat<f64>) -> Result<Self, CodingError> {
+        for j in 0..atoms.ncols() {
+            let mut norm2 = 0.0;
+            for i in 0..atoms.nrows() {
+                norm2 += atoms[(i, j)] * atoms[(i, j)];
+            }
+            if !norm2.is_finite() {
+                return Err(CodingError::NotFinite { what: "dictionary" });
+            }
+            if norm2 > 1.0 + 1e-5 {
+                return Err(CodingError::BadParameter {
+                    name: "atom norm",
+                    expected: "at most 1",
+                    found: format!("{}", norm2.sqrt()),
+                });
+            }
+        }
+        let gram = atoms.transpose() * &atoms;
+        Ok(Self { atoms, gram })
+    }
+
+    /// D, M × L, one atom per column.
+    pub fn atoms(&self) -> &Mat<f64> {
+        &self.atoms
+    }
+
+    /// DᵀD, L × L, symmetric.
+    pub fn gram(&self) -> &Mat<f64> {
+        &self.gram
+    }
+
+    /// M, the length of an atom.
+    pub fn dimension(&self) -> usize {
+        self.atoms.nrows()
+    }
+
+    /// L, the number of atoms.
+    pub fn len(&self) -> usize {
+        self.atoms.ncols()
+    }
+
+    /// Whether there are no atoms.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}

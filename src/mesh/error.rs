@@ -1,0 +1,62 @@
+//! Why bytes did not become a mesh. Every variant is one stable problem code of the API.
+
+use super::Format;
+
+/// Why a file could not be read or a mesh could not be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MeshError {
+    /// Nothing was sent.
+    #[error("the file is empty; send a mesh as OBJ, glTF, GLB, PLY, STL or OFF")]
+    Empty,
+    /// Neither the bytes, nor the declared type, nor the name tell a format we read.
+    #[error("the format was not recognised; shapelex reads OBJ, glTF, GLB, PLY, STL and OFF")]
+    UnknownFormat,
+    /// The bytes are not what their format demands.
+    #[error("not a readable {format} file: {detail}")]
+    Malformed { format: Format, detail: String },
+    /// The file ends before what its header promises.
+    #[error("the {format} file is cut short: {detail}")]
+    Truncated { format: Format, detail: String },
+    /// The file needs something we do not do, named as its format names it.
+    #[error("the {format} file needs {feature}, which shapelex does not support; re-export it without")]
+    Unsupported { format: Format, feature: String },
+    /// A glTF points to a file that was not sent with it.
+    #[error(
+        "the glTF file refers to '{uri}', which was not part of the upload; send it in the same multipart request or export a GLB"
+    )]
+    MissingBuffer { uri: String },
+    /// A face points outside the vertex list.
+    #[error("face {face} refers to vertex {index}, but there are {vertices} vertices")]
+    IndexOutOfRange {
+        face: usize,
+        index: i64,
+        vertices: usize,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("vertex {vertex} has a coordinate that is not a finite number")]
+    NotFinite { vertex: usize },
+    /// There are points but no faces.
+    #[error("the file has {vertices} vertices and no faces; shapelex needs a surface, not a point cloud")]
+    NoFaces { vertices: usize },
+    /// Fewer vertices or faces than a spectrum needs, after cleaning.
+    #[error(
+        "only {vertices} vertices and {faces} faces are left after cleaning; a shape needs at least 4 vertices and 2 faces"
+    )]
+    TooSmall { vertices: usize, faces: usize },
+    /// All faces have zero area.
+    #[error("every face is degenerate (zero area or repeated vertices)")]
+    Degenerate,
+    /// More than the limits allow.
+    #[error("the mesh has {found} {what}, more than the limit of {limit}")]
+    TooLarge {
+        what: &'static str,
+        found: usize,
+        limit: usize,
+    },
+    /// Poses were asked of a file that has no animation.
+    #[error("poses were asked for, but the file has no animation")]
+    NoAnimation,
+    /// A [`TriMesh`](super::TriMesh) was built from arrays that break its invariants.
+    #[error("invalid mesh: {detail}")]
+    Invalid { detail: String },
+}

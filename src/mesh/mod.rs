@@ -1,0 +1,27 @@
+//! Bytes → a clean triangle mesh.
+
+pub mod clean;
+pub mod decimate;
+pub mod detect;
+pub mod double;
+pub mod error;
+pub mod gltf;
+pub mod holes;
+pub mod limits;
+pub mod obj;
+pub mod off;
+pub mod ply;
+pub mod prepare;
+pub mod read;
+pub mod soup;
+pub mod stl;
+pub mod trimesh;
+pub mod whiten;
+
+pub use detect::Format;
+pub use error::MeshError;
+pub use limits::Limits;
+pub use prepare::{Components, PrepareOptions, PrepareReport, prepare};
+pub use read::{Companion, Pose, Source, read, read_poses};
+pub use soup::TriangleSoup;
+pub use trimesh::TriMesh;

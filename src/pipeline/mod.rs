@@ -1,0 +1,12 @@
+//! The data flow and nothing else. The command line, the indexing worker and the query handler all call these three
+//! functions, so there is one way to do each: [`describe_shape`] / [`describe_query`] (bytes or mesh → signatures),
+//! [`learn_model`] (signatures → dictionaries) and [`rank`] (signatures × index → ranking).
+
+pub mod describe;
+pub mod error;
+pub mod learn;
+
+pub use crate::ranking::rank;
+pub use describe::{Description, Stage, describe_query, describe_shape};
+pub use error::PipelineError;
+pub use learn::{Model, ModelReport, learn_model};

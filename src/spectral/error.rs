@@ -1,0 +1,20 @@
+//! Why a mesh has no usable spectrum.
+
+use crate::cancel::Cancelled;
+
+/// Why operators or eigenpairs could not be computed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SpectralError {
+    /// The caller asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The stiffness matrix has an entry that is not finite, or could not be factorised.
+    #[error("the Laplacian of this mesh cannot be factorised: {detail}")]
+    Factorisation { detail: String },
+    /// The residual or orthogonality check failed after every attempt.
+    #[error("the eigen-solve did not reach the requested accuracy: {detail}")]
+    NotConverged { detail: String },
+    /// Too few non-zero eigenvalues for a signature.
+    #[error("the mesh has only {found} non-zero eigenvalues, {needed} are needed")]
+    TooFewEigenpairs { found: usize, needed: usize },
+}
