@@ -14,10 +14,16 @@
 //! the parameters. They build without the `service` feature.
 
 pub mod cancel;
+#[cfg(feature = "service")]
+pub mod cli;
 pub mod coding;
+#[cfg(feature = "service")]
+pub mod config;
 pub mod mesh;
 pub mod parameters;
 pub mod pipeline;
 pub mod ranking;
 pub mod signature;
 pub mod spectral;
+#[cfg(feature = "service")]
+pub mod telemetry;
