@@ -14,16 +14,23 @@
 //! the parameters. They build without the `service` feature.
 
 pub mod cancel;
-#[cfg(feature = "service")]
-pub mod cli;
 pub mod coding;
-#[cfg(feature = "service")]
-pub mod config;
 pub mod mesh;
 pub mod parameters;
 pub mod pipeline;
 pub mod ranking;
 pub mod signature;
 pub mod spectral;
+
+#[cfg(feature = "service")]
+pub mod cli;
+#[cfg(feature = "service")]
+pub mod config;
+#[cfg(feature = "service")]
+pub mod jobs;
+#[cfg(feature = "service")]
+pub mod model;
+#[cfg(feature = "service")]
+pub mod store;
 #[cfg(feature = "service")]
 pub mod telemetry;
