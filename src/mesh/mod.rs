@@ -13,6 +13,7 @@ pub mod off;
 pub mod ply;
 pub mod prepare;
 pub mod read;
+mod scan;
 pub mod soup;
 pub mod stl;
 pub mod trimesh;
