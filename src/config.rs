@@ -17,10 +17,8 @@ use std::time::Duration;
 /// Where the service and the local commands keep their data, unless told otherwise.
 pub const DEFAULT_DATA: &str = "shapelex-data";
 /// Where the service listens, and where clients look for it, unless told otherwise.
-pub const DEFAULT_LISTEN: SocketAddr = SocketAddr::new(
-    std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST),
-    7345,
-);
+pub const DEFAULT_LISTEN: SocketAddr =
+    SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 7345);
 
 /// The configuration file or a setting is wrong.
 #[derive(Debug, thiserror::Error)]

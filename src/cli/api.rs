@@ -1,10 +1,10 @@
 //! The calls of the API that commands make.
 
+use super::CliError;
 use super::client::{CallError, Client, Payload};
 use super::files::MeshFile;
 use super::parameters::ParameterArgs;
 use super::progress::Progress;
-use super::CliError;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::time::Duration;
@@ -25,8 +25,17 @@ pub struct Uploaded {
 ///
 /// # Errors
 /// [`CallError`] where the file is refused or nobody answers.
-pub fn upload(client: &Client, class: &str, file: MeshFile, poses: Option<usize>) -> Result<Uploaded, CallError> {
-    let mut path = format!("/v1/classes/{}/shapes?create=true&name={}", encode(class), encode(&file.name));
+pub fn upload(
+    client: &Client,
+    class: &str,
+    file: MeshFile,
+    poses: Option<usize>,
+) -> Result<Uploaded, CallError> {
+    let mut path = format!(
+        "/v1/classes/{}/shapes?create=true&name={}",
+        encode(class),
+        encode(&file.name)
+    );
     if let Some(poses) = poses {
         // Writing to a String cannot fail.
         let _ = write!(path, "&poses={poses}");
@@ -77,7 +86,9 @@ fn follow(client: &Client, mut job: Value) -> Result<Value, CliError> {
             let number = |key: &str| step[key].as_u64().unwrap_or(0) as usize;
             let is_last = job["steps"].as_array().and_then(|s| s.last()) == Some(step);
             match &shown {
-                Some((current, progress)) if current == name => progress.set(number("finished"), number("total")),
+                Some((current, progress)) if current == name => {
+                    progress.set(number("finished"), number("total"))
+                }
                 _ if is_last => {
                     if let Some((_, ended)) = shown.take() {
                         ended.finish();
@@ -117,8 +128,8 @@ fn mesh_payload(file: MeshFile) -> Payload {
     // A boundary the contents would have to hash themselves to contain.
     let boundary = format!("shapelex-{}", &hash.finalize().to_hex()[..40]);
     let mut body = Vec::new();
-    let parts = std::iter::once((&file.name, &file.bytes))
-        .chain(file.companions.iter().map(|c| (&c.name, &c.bytes)));
+    let parts =
+        std::iter::once((&file.name, &file.bytes)).chain(file.companions.iter().map(|c| (&c.name, &c.bytes)));
     for (name, bytes) in parts {
         let name = name.replace(['"', '\r', '\n'], "_");
         body.extend_from_slice(
@@ -171,7 +182,9 @@ mod tests {
         let Payload::Bytes(content_type, body) = mesh_payload(file) else {
             panic!("expected bytes")
         };
-        let boundary = content_type.strip_prefix("multipart/form-data; boundary=").unwrap();
+        let boundary = content_type
+            .strip_prefix("multipart/form-data; boundary=")
+            .unwrap();
         let body = String::from_utf8(body).unwrap();
         assert_eq!(body.matches(&format!("--{boundary}\r\n")).count(), 2);
         assert!(body.ends_with(&format!("--{boundary}--\r\n")));

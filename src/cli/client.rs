@@ -148,7 +148,10 @@ impl Client {
     pub fn call(&self, method: &str, path: &str, payload: Payload) -> Result<Value, CallError> {
         let (content_type, body) = match payload {
             Payload::Empty => (None, Vec::new()),
-            Payload::Json(value) => (Some("application/json".to_owned()), value.to_string().into_bytes()),
+            Payload::Json(value) => (
+                Some("application/json".to_owned()),
+                value.to_string().into_bytes(),
+            ),
             Payload::Bytes(content_type, bytes) => (Some(content_type), bytes),
         };
         let (status, bytes) = self.send(method, path, content_type, body)?;

@@ -55,7 +55,9 @@ pub struct DemoArgs {
 /// [`CliError::Usage`] for fewer than two classes or poses; [`CliError::Failed`] where a step fails.
 pub fn run(args: &DemoArgs, json: bool) -> Result<(), CliError> {
     if args.classes < 2 || args.poses < 2 {
-        return Err(CliError::Usage("--classes and --poses must be 2 or more".to_owned()));
+        return Err(CliError::Usage(
+            "--classes and --poses must be 2 or more".to_owned(),
+        ));
     }
     args.parameters.parameters()?;
     let began = Instant::now();
@@ -68,7 +70,8 @@ pub fn run(args: &DemoArgs, json: bool) -> Result<(), CliError> {
     )?;
     let made = began.elapsed().as_secs_f64();
     let training = training_poses(args.poses);
-    let (known, unseen): (Vec<Specimen>, Vec<Specimen>) = specimens.into_iter().partition(|s| s.pose < training);
+    let (known, unseen): (Vec<Specimen>, Vec<Specimen>) =
+        specimens.into_iter().partition(|s| s.pose < training);
 
     let temporary = match args.data {
         Some(_) => None,
@@ -176,13 +179,18 @@ fn query(client: &Client, specimens: &[Specimen]) -> Result<Vec<Answer>, CliErro
 
 /// What to try next, on stderr: stdout's last line is the answer.
 fn print_commands(url: &str, folder: &Path, unseen: &[Specimen]) {
-    let example = unseen.first().map_or_else(
-        || folder.to_owned(),
-        |s| folder.join(&s.class).join(&s.name),
+    let example = unseen
+        .first()
+        .map_or_else(|| folder.to_owned(), |s| folder.join(&s.class).join(&s.name));
+    eprintln!(
+        "\nThe service stays up until Ctrl-C. Poses it has not seen are in {}",
+        folder.display()
     );
-    eprintln!("\nThe service stays up until Ctrl-C. Poses it has not seen are in {}", folder.display());
     eprintln!("Try:");
-    eprintln!("  curl --data-binary @{} '{url}/v1/query?top=3'", example.display());
+    eprintln!(
+        "  curl --data-binary @{} '{url}/v1/query?top=3'",
+        example.display()
+    );
     eprintln!("  curl {url}/v1/classes");
     eprintln!("  curl {url}/v1/index");
     eprintln!("  open {url}/docs");
@@ -216,12 +224,18 @@ impl Running {
                 })
             })?;
         match told.recv_timeout(START_WITHIN) {
-            Ok(address) => Ok(Self { address, stop, thread }),
+            Ok(address) => Ok(Self {
+                address,
+                stop,
+                thread,
+            }),
             Err(_) if thread.is_finished() => Err(match thread.join() {
                 Ok(Err(error)) => error,
                 _ => CliError::Failed("the service ended as it started".to_owned()),
             }),
-            Err(_) => Err(CliError::Failed("the service did not start within a minute".to_owned())),
+            Err(_) => Err(CliError::Failed(
+                "the service did not start within a minute".to_owned(),
+            )),
         }
     }
 

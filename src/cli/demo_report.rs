@@ -29,7 +29,9 @@ impl Answer {
     }
 
     fn answered(&self) -> &str {
-        self.value["classes"][0]["class"]["name"].as_str().unwrap_or("nothing")
+        self.value["classes"][0]["class"]["name"]
+            .as_str()
+            .unwrap_or("nothing")
     }
 
     fn is_right(&self) -> bool {
@@ -167,7 +169,11 @@ mod tests {
     #[test]
     fn mistakes_are_counted_and_named() {
         let answer = |class: &str, answered: &str| {
-            Answer::new(class, &format!("{class}-08.obj"), json!({"classes": [{"class": {"name": answered}}]}))
+            Answer::new(
+                class,
+                &format!("{class}-08.obj"),
+                json!({"classes": [{"class": {"name": answered}}]}),
+            )
         };
         let answers = [answer("cat", "cat"), answer("dog", "wolf"), answer("cow", "cow")];
         let summary = Summary::new(&answers, (3, 2, 1), [0.0; 4], 1.0, String::new());

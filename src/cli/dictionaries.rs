@@ -112,7 +112,10 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Exported, String> {
         ));
     }
     let metadata: Metadata = serde_json::from_str(metadata).map_err(|error| unreadable(&error))?;
-    metadata.parameters.validate().map_err(|error| error.to_string())?;
+    metadata
+        .parameters
+        .validate()
+        .map_err(|error| error.to_string())?;
     let tensors = SafeTensors::deserialize(bytes).map_err(|error| unreadable(&error))?;
     let channels = metadata.parameters.channels();
     let classes = metadata
@@ -126,7 +129,8 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Exported, String> {
                     let tensor = tensors
                         .tensor(&name)
                         .map_err(|_| format!("tensor '{name}' is missing"))?;
-                    let dictionary = dictionary(&tensor).map_err(|reason| format!("tensor '{name}': {reason}"))?;
+                    let dictionary =
+                        dictionary(&tensor).map_err(|reason| format!("tensor '{name}': {reason}"))?;
                     Ok((channel, Arc::new(dictionary)))
                 })
                 .collect::<Result<BTreeMap<_, _>, String>>()?;
@@ -148,7 +152,10 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Exported, String> {
 
 fn dictionary(tensor: &TensorView<'_>) -> Result<Dictionary, String> {
     let &[rows, columns] = tensor.shape() else {
-        return Err(format!("expected a matrix, found {} dimensions", tensor.shape().len()));
+        return Err(format!(
+            "expected a matrix, found {} dimensions",
+            tensor.shape().len()
+        ));
     };
     if tensor.dtype() != Dtype::F32 {
         return Err(format!("expected f32, found {:?}", tensor.dtype()));

@@ -58,10 +58,7 @@ fn outcome(outcome: &Outcome) -> String {
         100.0 * outcome.top1
     );
     if e.not_queried > 0 {
-        text += &format!(
-            "; {} not queried, alone in their class",
-            e.not_queried
-        );
+        text += &format!("; {} not queried, alone in their class", e.not_queried);
     }
     text += "\n";
     text += &confusion(outcome);

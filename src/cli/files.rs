@@ -18,8 +18,10 @@ pub struct LabelledFile {
 
 /// The last part of a path, for people.
 pub fn file_name(path: &Path) -> String {
-    path.file_name()
-        .map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
+    path.file_name().map_or_else(
+        || path.display().to_string(),
+        |n| n.to_string_lossy().into_owned(),
+    )
 }
 
 /// The mesh files of a folder per class, ordered by class and name. A mesh file that lies in `dir` itself is a class
@@ -59,7 +61,11 @@ pub fn labelled_files(dir: &Path) -> Result<Vec<LabelledFile>, CliError> {
 
 fn entries(dir: &Path) -> Result<Vec<PathBuf>, CliError> {
     let mut paths = std::fs::read_dir(dir)
-        .and_then(|entries| entries.map(|e| e.map(|e| e.path())).collect::<Result<Vec<_>, _>>())
+        .and_then(|entries| {
+            entries
+                .map(|e| e.map(|e| e.path()))
+                .collect::<Result<Vec<_>, _>>()
+        })
         .map_err(|error| CliError::at(dir, error))?;
     paths.retain(|p| !file_name(p).starts_with('.'));
     paths.sort();
@@ -164,7 +170,14 @@ mod tests {
     #[test]
     fn folders_are_classes_and_loose_files_classes_of_their_own() {
         let dir = tempfile::tempdir().unwrap();
-        for file in ["cat/b.obj", "cat/a.OBJ", "cat/notes.txt", "dog/a.off", "Fox.gltf", ".git/x.obj"] {
+        for file in [
+            "cat/b.obj",
+            "cat/a.OBJ",
+            "cat/notes.txt",
+            "dog/a.off",
+            "Fox.gltf",
+            ".git/x.obj",
+        ] {
             let path = dir.path().join(file);
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             std::fs::write(path, "").unwrap();
@@ -174,7 +187,12 @@ mod tests {
             .into_iter()
             .map(|f| (f.class, file_name(&f.path)))
             .collect();
-        let expected = [("Fox", "Fox.gltf"), ("cat", "a.OBJ"), ("cat", "b.obj"), ("dog", "a.off")];
+        let expected = [
+            ("Fox", "Fox.gltf"),
+            ("cat", "a.OBJ"),
+            ("cat", "b.obj"),
+            ("dog", "a.off"),
+        ];
         assert_eq!(found, expected.map(|(c, n)| (c.to_owned(), n.to_owned())));
         let empty = tempfile::tempdir().unwrap();
         assert!(matches!(labelled_files(empty.path()), Err(CliError::Usage(_))));

@@ -86,7 +86,10 @@ fn inspect(
         }
         Some(count) => {
             let (format, poses) = read_poses(&mesh.source(), count, &limits)?;
-            (format, poses.into_iter().map(|p| (Some(p.label), p.soup)).collect())
+            (
+                format,
+                poses.into_iter().map(|p| (Some(p.label), p.soup)).collect(),
+            )
         }
     };
     soups

@@ -87,7 +87,11 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Err(error) => {
             // Printing help fails only where nobody reads it.
             let _ = error.print();
-            return ExitCode::from(if error.use_stderr() { error::USAGE } else { error::OK });
+            return ExitCode::from(if error.use_stderr() {
+                error::USAGE
+            } else {
+                error::OK
+            });
         }
     };
     match dispatch(&cli) {

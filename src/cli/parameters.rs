@@ -117,7 +117,11 @@ mod tests {
     #[test]
     fn mistakes_name_the_key_and_what_there_is() {
         let message = |set: &str| given(None, &[set]).unwrap_err().to_string();
-        assert!(message("atom=64").contains("eigenpairs, "), "{}", message("atom=64"));
+        assert!(
+            message("atom=64").contains("eigenpairs, "),
+            "{}",
+            message("atom=64")
+        );
         assert!(message("atoms").contains("KEY=VALUE"));
         assert!(message("atoms=many").contains("--set atoms=many"));
         assert!(message("atoms=0").contains("atoms must be between"));

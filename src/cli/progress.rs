@@ -32,7 +32,9 @@ impl Progress {
         let shown = if std::io::stderr().is_terminal() {
             let bar = ProgressBar::new(total as u64);
             // The template is a literal, so parsing it cannot fail; the default style is a fair substitute if it did.
-            if let Ok(style) = ProgressStyle::with_template("{msg:<18} {bar:32} {pos}/{len} {elapsed} (eta {eta})") {
+            if let Ok(style) =
+                ProgressStyle::with_template("{msg:<18} {bar:32} {pos}/{len} {elapsed} (eta {eta})")
+            {
                 bar.set_style(style);
             }
             bar.set_message(label.to_owned());

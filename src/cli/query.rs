@@ -154,7 +154,8 @@ pub fn text(path: &Path, answer: &Value) -> String {
                 format!("{:.5}", row.score),
                 format!("{:.4}", row.relative_error),
                 format!("{:.2}", row.mean_nonzeros),
-                row.margin.map_or(String::new(), |m| format!("{:.2} %", 100.0 * m)),
+                row.margin
+                    .map_or(String::new(), |m| format!("{:.2} %", 100.0 * m)),
             ]
         })
         .collect();

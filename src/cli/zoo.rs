@@ -109,7 +109,9 @@ pub fn write(dir: &Path, specimen: &Specimen) -> Result<(), CliError> {
 /// [`CliError::Usage`] for zero classes or poses; [`CliError::Failed`] where a creature or a file cannot be made.
 pub fn run(args: &ZooArgs, as_json: bool) -> Result<(), CliError> {
     if args.classes == 0 || args.poses == 0 {
-        return Err(CliError::Usage("--classes and --poses must be 1 or more".to_owned()));
+        return Err(CliError::Usage(
+            "--classes and --poses must be 1 or more".to_owned(),
+        ));
     }
     let options = ZooOptions {
         min_vertices: args.min_vertices,
