@@ -7,6 +7,6 @@ pub mod error;
 pub mod learn;
 
 pub use crate::ranking::rank;
-pub use describe::{Description, Stage, describe_query, describe_shape};
+pub use describe::{Description, Stage, describe_both, describe_query, describe_shape};
 pub use error::PipelineError;
 pub use learn::{Model, ModelReport, learn_model};

@@ -1,0 +1,7 @@
+//! How right the method is on labelled shapes.
+
+pub mod evaluate;
+pub mod protocol;
+
+pub use evaluate::{Evaluation, LabelledShape, QueryResult, evaluate};
+pub use protocol::{Protocol, Round, rounds};
