@@ -17,6 +17,7 @@ pub mod orient;
 pub mod ply;
 pub mod prepare;
 pub mod read;
+mod scan;
 pub mod soup;
 pub mod stl;
 pub mod trimesh;
