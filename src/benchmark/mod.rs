@@ -1,5 +1,6 @@
 //! How right the method is on labelled shapes.
 
+pub mod deform;
 pub mod evaluate;
 pub mod protocol;
 

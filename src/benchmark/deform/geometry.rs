@@ -9,7 +9,11 @@ use std::f64::consts::TAU;
 
 /// √ of the total area: the unit of length.
 pub fn length_unit(mesh: &TriangleSoup) -> f64 {
-    mesh.faces.iter().map(|f| face_area(&mesh.vertices, f)).sum::<f64>().sqrt()
+    mesh.faces
+        .iter()
+        .map(|f| face_area(&mesh.vertices, f))
+        .sum::<f64>()
+        .sqrt()
 }
 
 /// A third of the incident areas, one entry per vertex.
@@ -90,9 +94,21 @@ pub fn rotation(rng: &mut impl Rng) -> [[f64; 3]; 3] {
     let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
     let [w, x, y, z] = q.map(|v| v / norm);
     [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        [
+            1.0 - 2.0 * (y * y + z * z),
+            2.0 * (x * y - w * z),
+            2.0 * (x * z + w * y),
+        ],
+        [
+            2.0 * (x * y + w * z),
+            1.0 - 2.0 * (x * x + z * z),
+            2.0 * (y * z - w * x),
+        ],
+        [
+            2.0 * (x * z - w * y),
+            2.0 * (y * z + w * x),
+            1.0 - 2.0 * (x * x + y * y),
+        ],
     ]
 }
 
@@ -104,5 +120,8 @@ pub fn map(matrix: &[[f64; 3]; 3], p: &[f64; 3]) -> [f64; 3] {
 /// The faces for which `keep` holds; vertices stay, used or not.
 pub fn keep_faces(mesh: &TriangleSoup, keep: impl Fn(&[u32; 3]) -> bool) -> TriangleSoup {
     let faces = mesh.faces.iter().copied().filter(|f| keep(f)).collect();
-    TriangleSoup { vertices: mesh.vertices.clone(), faces }
+    TriangleSoup {
+        vertices: mesh.vertices.clone(),
+        faces,
+    }
 }

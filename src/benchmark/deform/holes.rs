@@ -29,7 +29,10 @@ pub fn big(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> Triangle
                 threshold <= 0.0
             })
             .unwrap_or(0);
-        for (v, d) in edge_distances(&edges, centre as u32, radius).into_iter().enumerate() {
+        for (v, d) in edge_distances(&edges, centre as u32, radius)
+            .into_iter()
+            .enumerate()
+        {
             removed[v] |= d.is_finite();
         }
     }
@@ -41,6 +44,8 @@ pub fn micro(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> Triang
     let n = null.vertices.len();
     let count = ((MICRO_SHARE * f64::from(strength) * n as f64).ceil() as usize).min(n);
     let mut removed = vec![false; n];
-    index::sample(rng, n, count).into_iter().for_each(|v| removed[v] = true);
+    index::sample(rng, n, count)
+        .into_iter()
+        .for_each(|v| removed[v] = true);
     keep_faces(null, |f| !f.iter().any(|&v| removed[v as usize]))
 }

@@ -16,7 +16,9 @@ const TRIED: usize = 400;
 pub fn weld(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> TriangleSoup {
     let edges = neighbours(null);
     let far = FAR * length_unit(null);
-    let mut ends: Vec<u32> = (0..null.vertices.len() as u32).filter(|&v| !edges[v as usize].is_empty()).collect();
+    let mut ends: Vec<u32> = (0..null.vertices.len() as u32)
+        .filter(|&v| !edges[v as usize].is_empty())
+        .collect();
     ends.shuffle(rng);
     ends.truncate(TRIED);
     let mut pairs: Vec<(f64, u32, u32)> = ends
@@ -25,7 +27,13 @@ pub fn weld(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> Triangl
             let along = edge_distances(&edges, a, far);
             (0..null.vertices.len() as u32)
                 .filter(|&b| !along[b as usize].is_finite() && !edges[b as usize].is_empty())
-                .map(|b| (distance(&null.vertices[a as usize], &null.vertices[b as usize]), a, b))
+                .map(|b| {
+                    (
+                        distance(&null.vertices[a as usize], &null.vertices[b as usize]),
+                        a,
+                        b,
+                    )
+                })
                 .min_by(|x, y| x.0.total_cmp(&y.0))
         })
         .collect();

@@ -29,22 +29,38 @@ pub fn affine(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> Trian
     let matrix: [[f64; 3]; 3] = std::array::from_fn(|i| {
         std::array::from_fn(|j| (0..3).map(|k| frame[i][k] * stretch[k] * frame[j][k]).sum())
     });
-    TriangleSoup { vertices: null.vertices.iter().map(|p| map(&matrix, p)).collect(), faces: null.faces.clone() }
+    TriangleSoup {
+        vertices: null.vertices.iter().map(|p| map(&matrix, p)).collect(),
+        faces: null.faces.clone(),
+    }
 }
 
 /// v ← s v.
 pub fn scale(null: &TriangleSoup, strength: u32) -> TriangleSoup {
     let s = SCALES[strength as usize - 1];
-    TriangleSoup { vertices: null.vertices.iter().map(|p| p.map(|x| s * x)).collect(), faces: null.faces.clone() }
+    TriangleSoup {
+        vertices: null.vertices.iter().map(|p| p.map(|x| s * x)).collect(),
+        faces: null.faces.clone(),
+    }
 }
 
 /// v ← v + ε, ε Gaussian with a standard deviation proportional to the strength.
 pub fn noise(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> TriangleSoup {
     let edges = neighbours(null);
-    let (sum, count) = edges.iter().flatten().fold((0.0, 0usize), |(s, n), e| (s + e.1, n + 1));
+    let (sum, count) = edges
+        .iter()
+        .flatten()
+        .fold((0.0, 0usize), |(s, n), e| (s + e.1, n + 1));
     let deviation = NOISE * f64::from(strength) * sum / count.max(1) as f64;
-    let vertices = null.vertices.iter().map(|p| p.map(|x| x + deviation * gaussian(rng))).collect();
-    TriangleSoup { vertices, faces: null.faces.clone() }
+    let vertices = null
+        .vertices
+        .iter()
+        .map(|p| p.map(|x| x + deviation * gaussian(rng)))
+        .collect();
+    TriangleSoup {
+        vertices,
+        faces: null.faces.clone(),
+    }
 }
 
 /// A share of the vertices, growing with the strength, is moved a fixed distance in random directions.
@@ -54,10 +70,18 @@ pub fn shot_noise(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> T
     let throw = SHOT_DISTANCE * length_unit(null);
     for i in index::sample(rng, vertices.len(), count.min(vertices.len())) {
         let direction: [f64; 3] = std::array::from_fn(|_| gaussian(rng));
-        let norm = direction.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+        let norm = direction
+            .iter()
+            .map(|x| x * x)
+            .sum::<f64>()
+            .sqrt()
+            .max(f64::MIN_POSITIVE);
         for k in 0..3 {
             vertices[i][k] += throw * direction[k] / norm;
         }
     }
-    TriangleSoup { vertices, faces: null.faces.clone() }
+    TriangleSoup {
+        vertices,
+        faces: null.faces.clone(),
+    }
 }

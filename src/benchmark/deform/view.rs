@@ -16,8 +16,14 @@ pub fn visible(null: &TriangleSoup, _strength: u32, rng: &mut ChaCha8Rng) -> Tri
     let camera = rotation(rng);
     let seen: Vec<[f64; 3]> = null.vertices.iter().map(|p| map(&camera, p)).collect();
     let bound = |k: usize, pick: fn(f64, f64) -> f64, start: f64| seen.iter().map(|p| p[k]).fold(start, pick);
-    let low = [bound(0, f64::min, f64::INFINITY), bound(1, f64::min, f64::INFINITY)];
-    let high = [bound(0, f64::max, f64::NEG_INFINITY), bound(1, f64::max, f64::NEG_INFINITY)];
+    let low = [
+        bound(0, f64::min, f64::INFINITY),
+        bound(1, f64::min, f64::INFINITY),
+    ];
+    let high = [
+        bound(0, f64::max, f64::NEG_INFINITY),
+        bound(1, f64::max, f64::NEG_INFINITY),
+    ];
     let pixel = ((high[0] - low[0]).max(high[1] - low[1]) / PIXELS as f64).max(f64::MIN_POSITIVE);
     let points: Vec<[f64; 3]> = seen
         .iter()
@@ -39,12 +45,16 @@ pub fn visible(null: &TriangleSoup, _strength: u32, rng: &mut ChaCha8Rng) -> Tri
         .copied()
         .filter(|f| {
             let corners = f.map(|v| points[v as usize]);
-            let centroid: [f64; 3] = std::array::from_fn(|k| (corners[0][k] + corners[1][k] + corners[2][k]) / 3.0);
+            let centroid: [f64; 3] =
+                std::array::from_fn(|k| (corners[0][k] + corners[1][k] + corners[2][k]) / 3.0);
             let towards = |c: [f64; 3]| std::array::from_fn(|k| 0.25 * centroid[k] + 0.75 * c[k]);
             front(centroid) || corners.into_iter().filter(|&c| front(towards(c))).count() >= 2
         })
         .collect();
-    TriangleSoup { vertices: null.vertices.clone(), faces }
+    TriangleSoup {
+        vertices: null.vertices.clone(),
+        faces,
+    }
 }
 
 /// Draws one triangle into the picture of depths; greater is nearer.
