@@ -32,6 +32,12 @@ pub enum JobError {
     /// The service is going down.
     #[error("the service is shutting down")]
     ShuttingDown,
+    /// The worker could not be started.
+    #[error("the indexing worker could not be started: {detail}")]
+    NoWorker {
+        /// The failure.
+        detail: String,
+    },
     /// The store failed.
     #[error(transparent)]
     Store(StoreError),
