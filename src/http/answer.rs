@@ -3,7 +3,6 @@
 use super::admission::Work;
 use super::dto::class::ClassRef;
 use super::dto::query::{QueryAnswer, QueryOptions, RankedClass, RankedShape};
-use super::dto::shape::format_name;
 use super::metrics;
 use super::problem::Problem;
 use super::problem_from::index_empty;
@@ -93,7 +92,7 @@ pub fn answer(
         confidence: ranking.confidence,
         compared,
         signatures: ranking.signatures,
-        format: format_name(format).to_owned(),
+        format: format.extension().to_owned(),
         warnings: description.report.warnings.clone(),
         mesh: description.report.into(),
         eigenvalues: description.eigenvalues,

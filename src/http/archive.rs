@@ -73,7 +73,8 @@ fn unpack_zip(bytes: &[u8], limits: &ArchiveLimits) -> Result<Vec<Member>, Probl
     // The iterable reader parses one entry at a time: a directory of a million entries costs nothing before its
     // count is seen.
     let mut archive =
-        zip::read::ZipIterable::try_new(Cursor::new(bytes), zip::read::Config::default()).map_err(broken)?;
+        zip::unstable::read::ZipIterable::try_new(Cursor::new(bytes), zip::read::Config::default())
+            .map_err(broken)?;
     let mut collected = Collector::new(limits);
     collected.check_count(archive.len())?;
     let mut files = archive

@@ -79,6 +79,7 @@ impl From<RankingError> for Problem {
         match error {
             RankingError::Coding(inner) => inner.into(),
             RankingError::EmptyIndex => index_empty(),
+            RankingError::NoPlainView => Self::internal(detail),
             RankingError::MissingChannel { class, .. } => {
                 Self::new(Code::IndexIncomplete, detail).with("class", class)
             }
@@ -163,6 +164,7 @@ impl From<JobError> for Problem {
             JobError::Parameter(e) => e.into(),
             JobError::ShuttingDown => Self::new(Code::ShuttingDown, detail),
             JobError::Store(e) => e.into(),
+            JobError::NoWorker { .. } => Self::internal(detail),
         }
     }
 }

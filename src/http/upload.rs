@@ -25,7 +25,7 @@ pub struct UploadLimits {
 pub struct UploadedMesh {
     /// Its name, or `mesh` where it was sent without one.
     pub name: String,
-    /// The declared media type, where it says more than "bytes".
+    /// The declared media type, where it names a mesh format.
     pub media_type: Option<String>,
     /// Its contents.
     pub bytes: Bytes,
@@ -230,31 +230,19 @@ fn media_type(headers: &HeaderMap) -> Option<String> {
 /// Media types of a raw body. curl stamps `application/x-www-form-urlencoded` on every `--data-binary` that names no
 /// type, so it says as little as `application/octet-stream`.
 fn is_readable(media_type: &str) -> bool {
-    media_type.starts_with("model/") || is_archive(media_type) || ACCEPTED.contains(&media_type)
+    media_type.starts_with("model/")
+        || Format::from_media_type(media_type).is_some()
+        || declared_archive(media_type).is_some()
+        || ACCEPTED.contains(&media_type)
 }
 
 const ACCEPTED: &[&str] = &[
     "application/octet-stream",
     "application/x-www-form-urlencoded",
-    "application/sla",
-    "application/vnd.ms-pki.stl",
     "application/x-tgif",
-    "application/ply",
-    "application/x-ply",
-    "application/gltf-buffer",
     "text/plain",
     "text/prs.wavefront-obj",
 ];
-
-const UNTOLD: &[&str] = &[
-    "application/octet-stream",
-    "application/x-www-form-urlencoded",
-    "text/plain",
-];
-
-fn is_archive(media_type: &str) -> bool {
-    declared_archive(media_type).is_some()
-}
 
 fn declared_archive(media_type: &str) -> Option<ArchiveKind> {
     match media_type {
@@ -390,7 +378,7 @@ fn sort(parts: Vec<Part>, limits: &UploadLimits) -> Result<Upload, Problem> {
         .into_iter()
         .map(|file| UploadedMesh {
             name: file.name,
-            media_type: file.media_type.filter(|t| !UNTOLD.contains(&t.as_str())),
+            media_type: file.media_type.filter(|t| Format::from_media_type(t).is_some()),
             bytes: file.bytes,
             buffers: buffers.clone(),
         })
@@ -405,13 +393,11 @@ enum Role {
 }
 
 fn role(file: &Part) -> Role {
-    let extension = file
-        .name
-        .rsplit_once('.')
-        .map(|(_, e)| e.to_ascii_lowercase())
-        .unwrap_or_default();
-    match extension.as_str() {
-        "obj" | "gltf" | "glb" | "ply" | "stl" | "off" => Role::Mesh,
+    if Format::from_name(&file.name).is_some() {
+        return Role::Mesh;
+    }
+    let extension = file.name.rsplit_once('.').map(|(_, e)| e.to_ascii_lowercase());
+    match extension.as_deref().unwrap_or_default() {
         "bin" => Role::Buffer,
         "mtl" | "png" | "jpg" | "jpeg" | "webp" | "ktx" | "ktx2" | "tga" | "bmp" | "dds" => Role::Other,
         _ if file.media_type.as_deref() == Some("application/gltf-buffer") => Role::Buffer,

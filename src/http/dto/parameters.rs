@@ -148,7 +148,7 @@ macro_rules! parameter_set {
         }
 
         /// Values to change; those left out stay.
-        #[derive(Clone, Debug, Default, PartialEq, Deserialize, ToSchema)]
+        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct ParameterOverrides {
             $($(#[$doc])* pub $field: Option<$wire>,)*

@@ -142,7 +142,7 @@ impl From<Shape> for ShapeDto {
             id: shape.id.to_string(),
             class: shape.class.to_string(),
             name: shape.name,
-            format: format_name(shape.format).to_owned(),
+            format: shape.format.extension().to_owned(),
             bytes: shape.bytes,
             hash: shape.content.to_string(),
             companions: shape
@@ -193,30 +193,4 @@ pub struct UploadResult {
     pub shapes: Vec<UploadedShape>,
     /// Files that were neither meshes nor buffers, such as materials and textures.
     pub ignored: Vec<String>,
-}
-
-/// A format's name on the wire, which is also its usual file extension.
-pub fn format_name(format: crate::mesh::Format) -> &'static str {
-    use crate::mesh::Format;
-    match format {
-        Format::Obj => "obj",
-        Format::Gltf => "gltf",
-        Format::Glb => "glb",
-        Format::Ply => "ply",
-        Format::Stl => "stl",
-        Format::Off => "off",
-    }
-}
-
-/// A format's media type.
-pub fn media_type(format: crate::mesh::Format) -> &'static str {
-    use crate::mesh::Format;
-    match format {
-        Format::Obj => "model/obj",
-        Format::Gltf => "model/gltf+json",
-        Format::Glb => "model/gltf-binary",
-        Format::Ply => "application/ply",
-        Format::Stl => "model/stl",
-        Format::Off => "application/octet-stream",
-    }
 }

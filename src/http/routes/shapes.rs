@@ -4,7 +4,7 @@ use super::classes::{find_class, insert};
 use crate::http::AppState;
 use crate::http::admission::Patience;
 use crate::http::dto::class::ClassDto;
-use crate::http::dto::shape::{ShapeDto, UploadQuery, UploadResult, media_type};
+use crate::http::dto::shape::{ShapeDto, UploadQuery, UploadResult};
 use crate::http::dto::{Binary, FilesForm, Page, PageQuery};
 use crate::http::extract::{ApiPath, ApiQuery};
 use crate::http::problem::{Code, Problem};
@@ -315,12 +315,12 @@ pub async fn delete_shape(
             ("etag" = String, description = "The hash of its bytes"),
             ("content-disposition" = String, description = "Its name"),
         ), content(
-            (Binary = "application/octet-stream"),
             (Binary = "model/obj"),
             (Binary = "model/gltf+json"),
             (Binary = "model/gltf-binary"),
             (Binary = "model/stl"),
-            (Binary = "application/ply"),
+            (Binary = "model/ply"),
+            (Binary = "model/off"),
         )),
         (status = 304, description = "The copy at hand is the file"),
     )
@@ -357,7 +357,7 @@ pub async fn get_original(
         let body = Body::from_stream(tokio_util::io::ReaderStream::with_capacity(file, 64 << 10));
         let mut response = body.into_response();
         insert(&mut response, header::CONTENT_LENGTH, &length.to_string());
-        insert(&mut response, header::CONTENT_TYPE, media_type(shape.format));
+        insert(&mut response, header::CONTENT_TYPE, shape.format.media_type());
         insert(&mut response, header::CONTENT_DISPOSITION, &disposition(&shape));
         response
     };
@@ -368,11 +368,7 @@ pub async fn get_original(
 
 /// `attachment` with the file's name, percent-encoded as RFC 8187 has it, so that every name is one header value.
 fn disposition(shape: &Shape) -> String {
-    let fallback = format!(
-        "{}.{}",
-        shape.id,
-        crate::http::dto::shape::format_name(shape.format)
-    );
+    let fallback = format!("{}.{}", shape.id, shape.format.extension());
     let name = shape.name.as_deref().unwrap_or(&fallback);
     let name = name.rsplit('/').next().unwrap_or(name);
     let mut encoded = String::new();
