@@ -29,6 +29,8 @@ pub mod cli;
 #[cfg(feature = "service")]
 pub mod config;
 #[cfg(feature = "service")]
+pub mod http;
+#[cfg(feature = "service")]
 pub mod jobs;
 #[cfg(feature = "service")]
 pub mod model;
