@@ -21,6 +21,7 @@ pub mod mesh;
 pub mod parameters;
 pub mod pipeline;
 pub mod ranking;
+pub mod sample;
 pub mod signature;
 pub mod spectral;
 
