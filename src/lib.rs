@@ -13,6 +13,8 @@
 //! The modules up to `benchmark` are the numeric core: no I/O, no clock, no globals; randomness comes from a seed in
 //! the parameters. They build without the `service` feature.
 
+pub mod baseline;
+pub mod benchmark;
 pub mod cancel;
 pub mod coding;
 pub mod mesh;

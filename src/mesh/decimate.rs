@@ -1,1 +1,127 @@
-//! (to be written)
+//! Simplification to the working size by quadric error (Garland and Heckbert 1997), with meshoptimizer.
+
+use super::clean::{Cleaned, clean_again, drop_unreferenced};
+use super::edges::edge_census;
+use super::orient::orient;
+use super::{Components, MeshError};
+use meshopt::{SimplifyOptions, simplify_decoder, simplify_sloppy_decoder};
+
+/// How a mesh came to its working size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Simplified {
+    /// It was small enough already.
+    No,
+    /// By edge collapses that keep the topology.
+    ByCollapse,
+    /// Non-manifold places had to be collapsed across.
+    AcrossTopology,
+    /// Collapses did not suffice; vertices were clustered on a grid, which may change the topology.
+    ByClustering,
+}
+
+/// Rounds of collapses at most; each starts from the last one's result.
+const ROUNDS: usize = 8;
+
+/// No bound on the error: the target is a size.
+const ANY_ERROR: f32 = 1e3;
+
+/// Reduces a mesh to at most `working_size` vertices; 0 leaves it as it is. Near-linear in the number of faces.
+///
+/// The result's vertices are a subset of the input's, at their full precision; only the choice of collapses is made
+/// in single precision, within the mesh's unit frame. Collapses first keep to the topology, then go across
+/// non-manifold places, and as the last resort vertices are clustered on a grid. Borders are free to move
+/// along themselves. A little regularisation keeps flat regions from being reduced to slivers, on which the
+/// piecewise linear Laplacian is poor. The result is cleaned again.
+///
+/// Errors: [`MeshError::Degenerate`] when nothing with an area is left.
+pub(super) fn simplify_to(
+    mesh: &mut Cleaned,
+    working_size: usize,
+    keep: Components,
+) -> Result<Simplified, MeshError> {
+    if working_size == 0 || mesh.vertices.len() <= working_size {
+        return Ok(Simplified::No);
+    }
+    // Fewer than four vertices are not a mesh.
+    let size = working_size.max(4);
+    if edge_census(mesh.vertices.len(), &mesh.faces).inconsistent > 0 {
+        orient(mesh.vertices.len(), &mut mesh.faces);
+    }
+    let steps = [
+        (SimplifyOptions::RegularizeLight, Simplified::ByCollapse),
+        (
+            SimplifyOptions::RegularizeLight | SimplifyOptions::Permissive,
+            Simplified::AcrossTopology,
+        ),
+    ];
+    for (options, outcome) in steps {
+        collapse(mesh, size, options);
+        clean_again(mesh, keep)?;
+        if mesh.vertices.len() <= size {
+            return Ok(outcome);
+        }
+    }
+    cluster(mesh, size);
+    clean_again(mesh, keep)?;
+    Ok(Simplified::ByClustering)
+}
+
+/// Edge collapses until at most `size` vertices are left or no collapse is possible.
+fn collapse(mesh: &mut Cleaned, size: usize, options: SimplifyOptions) {
+    for round in 0..ROUNDS {
+        let (v, f) = (mesh.vertices.len(), mesh.faces.len());
+        if v <= size {
+            return;
+        }
+        // Faces in proportion to vertices never removes too many, as a collapse inside takes two faces and one on
+        // the border takes one. The later rounds, near the target, count two per vertex.
+        let target = if round == 0 {
+            (f as f64 * size as f64 / v as f64).ceil() as usize
+        } else {
+            f.saturating_sub(2 * (v - size))
+        };
+        let indices: Vec<u32> = mesh.faces.iter().flatten().copied().collect();
+        let result = simplify_decoder(
+            &indices,
+            &single_precision(&mesh.vertices),
+            3 * target.min(f),
+            ANY_ERROR,
+            options,
+            None,
+        );
+        adopt(mesh, &result);
+        if mesh.vertices.len() == v {
+            return;
+        }
+    }
+}
+
+/// Vertex clustering; halves its target until the size is met.
+fn cluster(mesh: &mut Cleaned, size: usize) {
+    let mut target = 2 * size;
+    while mesh.vertices.len() > size && target >= 2 {
+        let indices: Vec<u32> = mesh.faces.iter().flatten().copied().collect();
+        let result = simplify_sloppy_decoder(
+            &indices,
+            &single_precision(&mesh.vertices),
+            3 * target.min(mesh.faces.len()),
+            ANY_ERROR,
+            None,
+        );
+        if result.is_empty() {
+            return;
+        }
+        adopt(mesh, &result);
+        target = target * 3 / 4;
+    }
+}
+
+fn single_precision(vertices: &[[f64; 3]]) -> Vec<[f32; 3]> {
+    vertices.iter().map(|p| p.map(|x| x as f32)).collect()
+}
+
+/// Takes an index list over the mesh's own vertices as its faces.
+fn adopt(mesh: &mut Cleaned, indices: &[u32]) {
+    mesh.faces = indices.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
+    drop_unreferenced(&mut mesh.vertices, &mut mesh.faces);
+}

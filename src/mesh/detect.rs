@@ -1,5 +1,7 @@
 //! Which format the bytes are in: first by the bytes, then by the declared type, then by the name.
 
+use super::MeshError;
+use super::scan::Scanner;
 use serde::{Deserialize, Serialize};
 
 /// A mesh format shapelex reads.
@@ -30,5 +32,216 @@ impl std::fmt::Display for Format {
             Self::Stl => "STL",
             Self::Off => "OFF",
         })
+    }
+}
+
+impl Format {
+    /// All formats, in the order messages name them.
+    pub const ALL: [Self; 6] = [Self::Obj, Self::Gltf, Self::Glb, Self::Ply, Self::Stl, Self::Off];
+
+    /// The file name extension, lower case, without the dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Obj => "obj",
+            Self::Gltf => "gltf",
+            Self::Glb => "glb",
+            Self::Ply => "ply",
+            Self::Stl => "stl",
+            Self::Off => "off",
+        }
+    }
+
+    /// The media type files of this format are served as. IANA registers those of OBJ, glTF, GLB and STL; PLY and OFF
+    /// have none and get the obvious one.
+    pub fn media_type(self) -> &'static str {
+        match self {
+            Self::Obj => "model/obj",
+            Self::Gltf => "model/gltf+json",
+            Self::Glb => "model/gltf-binary",
+            Self::Ply => "model/ply",
+            Self::Stl => "model/stl",
+            Self::Off => "model/off",
+        }
+    }
+
+    /// The format a file name's extension tells, in any case: `Cat.OBJ` is OBJ. `None` for every other name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let (stem, extension) = name.rsplit_once('.')?;
+        let file_name = stem.rsplit(['/', '\\']).next()?;
+        // `.obj` and `dir/.obj` are hidden files without an extension.
+        if file_name.is_empty() {
+            return None;
+        }
+        Self::ALL
+            .into_iter()
+            .find(|f| f.extension().eq_ignore_ascii_case(extension))
+    }
+
+    /// The format a media type tells, parameters such as `; charset=utf-8` aside. `None` for types that tell nothing,
+    /// such as `text/plain` and `application/octet-stream`.
+    pub fn from_media_type(media_type: &str) -> Option<Self> {
+        let essence = media_type.split(';').next()?.trim().to_ascii_lowercase();
+        Some(match essence.as_str() {
+            "model/obj" | "application/x-obj" | "text/obj" => Self::Obj,
+            "model/gltf+json" => Self::Gltf,
+            "model/gltf-binary" => Self::Glb,
+            "model/ply" | "application/ply" | "application/x-ply" | "text/ply" => Self::Ply,
+            "model/stl"
+            | "model/x.stl-ascii"
+            | "model/x.stl-binary"
+            | "application/sla"
+            | "application/vnd.ms-pki.stl" => Self::Stl,
+            "model/off" | "application/off" => Self::Off,
+            _ => return None,
+        })
+    }
+}
+
+/// Tells the format of a file: from its bytes if they are unmistakable, else from its declared media type, else from
+/// its name.
+///
+/// Errors: [`MeshError::Empty`] for no bytes, [`MeshError::UnknownFormat`] if nothing tells.
+pub fn detect(bytes: &[u8], media_type: Option<&str>, name: Option<&str>) -> Result<Format, MeshError> {
+    if bytes.is_empty() {
+        return Err(MeshError::Empty);
+    }
+    from_bytes(bytes)
+        .or_else(|| media_type.and_then(Format::from_media_type))
+        .or_else(|| name.and_then(Format::from_name))
+        .ok_or(MeshError::UnknownFormat)
+}
+
+/// The format the bytes alone tell, or `None`. A start that is unmistakable counts even if the rest is broken; a
+/// truncated binary STL and an OBJ without vertices are not recognised.
+pub fn from_bytes(bytes: &[u8]) -> Option<Format> {
+    if bytes.starts_with(b"glTF") {
+        return Some(Format::Glb);
+    }
+    if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
+        return Some(Format::Ply);
+    }
+    // Before any text: the header of a binary STL is free and often begins with `solid`.
+    if super::stl::is_binary(bytes) {
+        return Some(Format::Stl);
+    }
+    let mut text = Scanner::new(bytes);
+    if text.skip_whitespace() && text.peek() == Some(b'{') {
+        return contains(bytes, b"\"asset\"").then_some(Format::Gltf);
+    }
+    let head = &text.rest()[..text.remaining().min(4096)];
+    if head.len() >= 5 && head[..5].eq_ignore_ascii_case(b"solid") {
+        let lower = head.to_ascii_lowercase();
+        if contains(&lower, b"facet") || contains(&lower, b"endsolid") {
+            return Some(Format::Stl);
+        }
+    }
+    if super::off::has_keyword(bytes) {
+        return Some(Format::Off);
+    }
+    is_obj(bytes).then_some(Format::Obj)
+}
+
+fn contains(haystack: &[u8], needle: &[u8]) -> bool {
+    haystack.windows(needle.len()).any(|w| w == needle)
+}
+
+/// Statements an OBJ file may hold before its first vertex, or instead of one in a broken file.
+const OBJ_STATEMENTS: [&[u8]; 13] = [
+    b"v", b"vn", b"vt", b"vp", b"f", b"l", b"p", b"o", b"g", b"s", b"mtllib", b"usemtl", b"mg",
+];
+
+/// Whether the first lines are all OBJ statements, with a vertex of three numbers among them.
+fn is_obj(bytes: &[u8]) -> bool {
+    let mut text = Scanner::new(bytes);
+    for _ in 0..1000 {
+        if !text.next_content() {
+            return false;
+        }
+        let word = text.word();
+        if !OBJ_STATEMENTS.contains(&word) {
+            return false;
+        }
+        if word == b"v" {
+            return (0..3).all(|_| text.number().is_some());
+        }
+        text.next_line();
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_come_first() {
+        let cases: [(&[u8], Format); 14] = [
+            (b"glTF\x02\0\0\0", Format::Glb),
+            (b"ply\nformat ascii 1.0\n", Format::Ply),
+            (b"ply\r\nformat ascii 1.0\r\n", Format::Ply),
+            (b" \n{\"asset\": {\"version\": \"2.0\"}}", Format::Gltf),
+            (b"solid cube\n  facet normal 0 0 1\n", Format::Stl),
+            (b"SOLID\nendsolid", Format::Stl),
+            (b"OFF\n8 6 12\n", Format::Off),
+            (b"# made by hand\nCOFF\n8 6 12\n", Format::Off),
+            (b"OFF8 6 12\n", Format::Off),
+            (b"STCNOFF\n", Format::Off),
+            (b"# cat\nmtllib cat.mtl\no cat\nv 0 0 1\n", Format::Obj),
+            (b"v 0.5 -1e3 2 1 0 0\n", Format::Obj),
+            (b"\xef\xbb\xbfv 0 0 1\n", Format::Obj),
+            (b"g default\r\nv 0 0 1\r\n", Format::Obj),
+        ];
+        for (bytes, format) in cases {
+            let found = detect(bytes, Some("image/png"), Some("x.jpg"));
+            assert_eq!(found, Ok(format), "{}", String::from_utf8_lossy(bytes));
+        }
+    }
+
+    #[test]
+    fn then_the_declared_type_then_the_name() {
+        let text = b"hello, world";
+        assert_eq!(detect(text, None, None), Err(MeshError::UnknownFormat));
+        assert_eq!(
+            detect(text, Some("text/plain"), None),
+            Err(MeshError::UnknownFormat)
+        );
+        assert_eq!(
+            detect(text, Some("Model/GLTF-Binary; x=1"), Some("a.obj")),
+            Ok(Format::Glb)
+        );
+        assert_eq!(
+            detect(text, Some("application/octet-stream"), Some("a.STL")),
+            Ok(Format::Stl)
+        );
+        assert_eq!(detect(b"", Some("model/obj"), None), Err(MeshError::Empty));
+        // JSON that is not glTF and a file of prose are not recognised.
+        assert_eq!(detect(b"{\"a\": 1}", None, None), Err(MeshError::UnknownFormat));
+        assert_eq!(
+            detect(b"v is a letter", None, None),
+            Err(MeshError::UnknownFormat)
+        );
+        assert_eq!(detect(b"OFFICE", None, None), Err(MeshError::UnknownFormat));
+    }
+
+    #[test]
+    fn names_and_types_round_trip() {
+        for format in Format::ALL {
+            assert_eq!(Format::from_media_type(format.media_type()), Some(format));
+            assert_eq!(
+                Format::from_name(&format!("dir.x/cat.{}", format.extension())),
+                Some(format)
+            );
+        }
+        for name in [
+            ".obj",
+            "dir/.obj",
+            "obj",
+            "cat.obj.zip",
+            "",
+            "cat.",
+            "dir.obj/cat",
+        ] {
+            assert_eq!(Format::from_name(name), None, "{name}");
+        }
     }
 }

@@ -60,3 +60,21 @@ pub enum MeshError {
     #[error("invalid mesh: {detail}")]
     Invalid { detail: String },
 }
+
+impl MeshError {
+    /// A [`MeshError::Malformed`] with these words.
+    pub(super) fn malformed(format: Format, detail: impl Into<String>) -> Self {
+        Self::Malformed {
+            format,
+            detail: detail.into(),
+        }
+    }
+
+    /// A [`MeshError::Truncated`] with these words.
+    pub(super) fn truncated(format: Format, detail: impl Into<String>) -> Self {
+        Self::Truncated {
+            format,
+            detail: detail.into(),
+        }
+    }
+}

@@ -1,1 +1,206 @@
-//! (to be written)
+//! Closing small boundary loops.
+
+use super::boundary::{boundary_length, distance};
+use super::edges::edge_census;
+use super::trimesh::face_area;
+
+/// A fan face below this share of the total area is not added, as the cleaning would drop it.
+const NO_AREA: f64 = 1e-12;
+
+/// Closes every boundary loop with a perimeter below `below` · √area by a fan around the mean of its vertices, and
+/// returns how many were closed.
+///
+/// The new vertices are appended, so the indices of the old ones stay. The area is that before anything is closed.
+/// Fan faces run against their neighbours' direction, as on a consistently oriented surface. A loop whose whole fan
+/// has no area (a slit) stays.
+pub(super) fn fill_small_holes(vertices: &mut Vec<[f64; 3]>, faces: &mut Vec<[u32; 3]>, below: f64) -> usize {
+    if below.is_nan() || below <= 0.0 {
+        return 0;
+    }
+    let area: f64 = faces.iter().map(|f| face_area(vertices, f)).sum();
+    let boundary = edge_census(vertices.len(), faces).boundary;
+    let mut filled = 0;
+    for edges in boundary_loops(vertices, &boundary) {
+        if boundary_length(vertices, &edges) >= below * area.sqrt() {
+            continue;
+        }
+        // Every vertex of a simple loop is in two of its edges, so the mean over ends is the mean over vertices.
+        let mut mean = [0.0; 3];
+        for v in edges.iter().flatten() {
+            for k in 0..3 {
+                mean[k] += vertices[*v as usize][k];
+            }
+        }
+        let centre = vertices.len() as u32;
+        vertices.push(mean.map(|x| x / (2 * edges.len()) as f64));
+        let before = faces.len();
+        for &[a, b] in &edges {
+            let fan = [b, a, centre];
+            if face_area(vertices, &fan) >= NO_AREA * area {
+                faces.push(fan);
+            }
+        }
+        if faces.len() == before {
+            vertices.pop();
+        } else {
+            filled += 1;
+        }
+    }
+    filled
+}
+
+/// Splits boundary edges into simple loops, each a list of the edges as given (their direction may vary).
+///
+/// At an ordinary boundary two edges meet in a vertex and there is nothing to choose. Where more meet (holes that
+/// touch in a vertex, non-manifold spots) the walk takes the shortest edge first, and whenever it comes back to a
+/// vertex it has passed, the part since then is a loop of its own. A walk that ends nowhere is dropped. Choices go by
+/// place, never by index, so the order of vertices does not matter.
+pub(super) fn boundary_loops(vertices: &[[f64; 3]], boundary: &[[u32; 2]]) -> Vec<Vec<[u32; 2]>> {
+    // Compact numbers of the vertices on the boundary, ordered by place.
+    let mut on: Vec<u32> = boundary.iter().flatten().copied().collect();
+    on.sort_unstable();
+    on.dedup();
+    let by_index = on.clone();
+    let place = |v: u32| vertices[v as usize];
+    on.sort_by(|&a, &b| {
+        place(a)
+            .partial_cmp(&place(b))
+            .unwrap_or(std::cmp::Ordering::Equal)
+            .then(a.cmp(&b))
+    });
+    let mut rank = vec![0usize; on.len()];
+    for (r, v) in on.iter().enumerate() {
+        rank[by_index.partition_point(|w| w < v)] = r;
+    }
+    let rank_of = |v: u32| rank[by_index.partition_point(|w| *w < v)];
+
+    // For each vertex its edges, shortest last, as a walk pops from the end.
+    let mut edges_at: Vec<Vec<(f64, usize, usize)>> = vec![Vec::new(); on.len()]; // length, other end, edge
+    for (e, &[a, b]) in boundary.iter().enumerate() {
+        let (ra, rb) = (rank_of(a), rank_of(b));
+        let length = distance(&place(a), &place(b));
+        edges_at[ra].push((length, rb, e));
+        edges_at[rb].push((length, ra, e));
+    }
+    for list in &mut edges_at {
+        list.sort_by(|x, y| y.0.total_cmp(&x.0).then(y.1.cmp(&x.1)));
+    }
+
+    let mut used = vec![false; boundary.len()];
+    let mut position = vec![usize::MAX; on.len()]; // where a vertex stands on the current path
+    let mut loops = Vec::new();
+    for start in 0..on.len() {
+        let mut path: Vec<usize> = vec![start]; // vertices
+        let mut trail: Vec<usize> = Vec::new(); // edges between them
+        position[start] = 0;
+        while let Some(&at) = path.last() {
+            let Some((_, to, e)) = edges_at[at].pop() else {
+                // A dead end: step back and leave the edge out.
+                position[at] = usize::MAX;
+                path.pop();
+                trail.pop();
+                continue;
+            };
+            if used[e] {
+                continue;
+            }
+            used[e] = true;
+            trail.push(e);
+            if position[to] == usize::MAX {
+                position[to] = path.len();
+                path.push(to);
+            } else {
+                let since = position[to];
+                loops.push(trail.drain(since..).map(|e| boundary[e]).collect());
+                for v in path.drain(since + 1..) {
+                    position[v] = usize::MAX;
+                }
+            }
+        }
+    }
+    loops
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A flat n × n grid of unit squares, two triangles each.
+    fn grid(n: u32) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+        let at = |i: u32, j: u32| i * (n + 1) + j;
+        let vertices = (0..=n)
+            .flat_map(|i| (0..=n).map(move |j| [f64::from(i), f64::from(j), 0.0]))
+            .collect();
+        let faces = (0..n)
+            .flat_map(|i| {
+                (0..n).flat_map(move |j| {
+                    [
+                        [at(i, j), at(i + 1, j), at(i + 1, j + 1)],
+                        [at(i, j), at(i + 1, j + 1), at(i, j + 1)],
+                    ]
+                })
+            })
+            .collect();
+        (vertices, faces)
+    }
+
+    /// Removes the squares with the given lower corners.
+    fn without(n: u32, squares: &[(u32, u32)]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+        let (vertices, faces) = grid(n);
+        let gone: Vec<u32> = squares.iter().map(|(i, j)| 2 * (i * n + j)).collect();
+        let faces = (faces.iter().enumerate())
+            .filter(|(f, _)| !gone.contains(&(*f as u32 & !1)))
+            .map(|(_, f)| *f)
+            .collect();
+        (vertices, faces)
+    }
+
+    fn area(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> f64 {
+        faces.iter().map(|f| face_area(vertices, f)).sum()
+    }
+
+    #[test]
+    fn a_small_hole_is_closed_and_the_outer_boundary_stays() {
+        let (mut vertices, mut faces) = without(8, &[(3, 3)]);
+        assert_eq!(fill_small_holes(&mut vertices, &mut faces, 1.2), 1);
+        assert_eq!(vertices.len(), 82);
+        assert_eq!(vertices[81], [3.5, 3.5, 0.0]);
+        assert!((area(&vertices, &faces) - 64.0).abs() < 1e-12);
+        let census = edge_census(vertices.len(), &faces);
+        assert_eq!(
+            (census.boundary.len(), census.non_manifold, census.inconsistent),
+            (32, 0, 0)
+        );
+    }
+
+    #[test]
+    fn holes_that_touch_in_a_vertex_are_two_loops() {
+        let (mut vertices, mut faces) = without(8, &[(3, 3), (4, 4), (4, 2)]);
+        assert_eq!(fill_small_holes(&mut vertices, &mut faces, 1.2), 3);
+        assert!((area(&vertices, &faces) - 64.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_hole_above_the_limit_stays() {
+        let (mut vertices, mut faces) = without(8, &[(2, 3), (3, 3), (4, 3), (5, 3)]); // perimeter 10 > 1.2 · √60
+        let before = faces.clone();
+        assert_eq!(fill_small_holes(&mut vertices, &mut faces, 1.2), 0);
+        assert_eq!(faces, before);
+        assert_eq!(fill_small_holes(&mut vertices, &mut faces, 0.0), 0);
+        assert_eq!(fill_small_holes(&mut vertices, &mut faces, f64::NAN), 0);
+    }
+
+    #[test]
+    fn walks_end_on_odd_vertices_and_dead_ends() {
+        // A lollipop: a square with a tail that ends nowhere, and a second tail.
+        let vertices: Vec<[f64; 3]> = (0..7)
+            .map(|i| [f64::from(i), f64::from(i * i % 5), 0.0])
+            .collect();
+        let edges = [[0, 1], [1, 2], [2, 3], [3, 0], [3, 4], [4, 5], [6, 4]];
+        let loops = boundary_loops(&vertices, &edges);
+        assert_eq!(loops.len(), 1);
+        let mut found = loops[0].clone();
+        found.sort_unstable();
+        assert_eq!(found, [[0, 1], [1, 2], [2, 3], [3, 0]]);
+    }
+}

@@ -1,5 +1,6 @@
 //! Ceilings checked before anything is allocated.
 
+use super::MeshError;
 use serde::{Deserialize, Serialize};
 
 /// What a reader may build at most. A file whose header or counts promise more is refused before it is loaded.
@@ -25,5 +26,34 @@ impl Default for Limits {
             max_bytes: 256 << 20,
             max_poses: 64,
         }
+    }
+}
+
+fn at_most(what: &'static str, found: usize, limit: usize) -> Result<(), MeshError> {
+    if found > limit {
+        return Err(MeshError::TooLarge { what, found, limit });
+    }
+    Ok(())
+}
+
+impl Limits {
+    /// Refuses more vertices than allowed with [`MeshError::TooLarge`].
+    pub fn check_vertices(&self, found: usize) -> Result<(), MeshError> {
+        at_most("vertices", found, self.max_vertices)
+    }
+
+    /// Refuses more triangles than allowed with [`MeshError::TooLarge`].
+    pub fn check_faces(&self, found: usize) -> Result<(), MeshError> {
+        at_most("faces", found, self.max_faces)
+    }
+
+    /// Refuses more bytes than allowed with [`MeshError::TooLarge`].
+    pub fn check_bytes(&self, found: usize) -> Result<(), MeshError> {
+        at_most("bytes", found, self.max_bytes)
+    }
+
+    /// Refuses more poses than allowed with [`MeshError::TooLarge`].
+    pub fn check_poses(&self, found: usize) -> Result<(), MeshError> {
+        at_most("poses", found, self.max_poses)
     }
 }

@@ -1,21 +1,27 @@
 //! Bytes → a clean triangle mesh.
 
+pub mod boundary;
 pub mod clean;
+pub mod components;
 pub mod decimate;
 pub mod detect;
 pub mod double;
+pub mod edges;
 pub mod error;
 pub mod gltf;
 pub mod holes;
 pub mod limits;
 pub mod obj;
 pub mod off;
+pub mod orient;
 pub mod ply;
 pub mod prepare;
 pub mod read;
+mod scan;
 pub mod soup;
 pub mod stl;
 pub mod trimesh;
+pub mod weld;
 pub mod whiten;
 
 pub use detect::Format;

@@ -1,7 +1,21 @@
 //! Soup → clean mesh of the working size, with a report of what was done.
 
+use super::boundary::boundary_length;
+use super::clean::{Cleaned, clean};
+use super::decimate::{Simplified, simplify_to};
+use super::edges::edge_census;
+use super::holes::fill_small_holes;
 use super::{MeshError, TriMesh, TriangleSoup};
 use serde::{Deserialize, Serialize};
+
+/// Boundary length / √area above which a surface counts as open (a half sphere has 2.507).
+pub const OPEN: f64 = 2.5;
+
+/// Fewer vertices than this describe a shape poorly.
+const FEW_VERTICES: usize = 300;
+
+/// More separate parts than this are worth a warning.
+const MANY_COMPONENTS: usize = 10;
 
 /// Which connected components are kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -51,15 +65,15 @@ pub struct PrepareReport {
     pub degenerate_faces: usize,
     /// Faces dropped because the same three vertices have one already.
     pub duplicate_faces: usize,
-    /// Vertices dropped because no face uses them.
+    /// Vertices dropped because no face uses them, or only dropped faces did.
     pub unreferenced_vertices: usize,
-    /// Connected components after cleaning.
+    /// Connected components (faces that share a vertex) after cleaning.
     pub components: usize,
-    /// Components left out, with their share of the area.
+    /// Components left out.
     pub components_dropped: usize,
     /// Share of the total area that was left out, 0 to 1.
     pub area_dropped: f64,
-    /// Edges with more than two faces.
+    /// Edges with more than two faces, before simplification.
     pub non_manifold_edges: usize,
     /// Edges with one face, after small holes were closed.
     pub boundary_edges: usize,
@@ -71,7 +85,7 @@ pub struct PrepareReport {
     pub vertices: usize,
     /// Faces of the prepared mesh.
     pub faces: usize,
-    /// Surface area before normalisation, in the file's squared units.
+    /// Surface area of the prepared mesh before normalisation, in the file's squared units.
     pub area: f64,
     /// Boundary length / √area after small holes were closed: 0 for a closed surface, 8–16 for a single view.
     pub openness: f64,
@@ -79,10 +93,109 @@ pub struct PrepareReport {
     pub warnings: Vec<String>,
 }
 
-/// Cleans, simplifies and closes small holes; the result has unit area.
-pub fn prepare(
-    _soup: TriangleSoup,
-    _options: &PrepareOptions,
-) -> Result<(TriMesh, PrepareReport), MeshError> {
-    Err(MeshError::Degenerate)
+/// Cleans, simplifies and closes small holes; the result has unit area and its area centroid at the origin.
+///
+/// In this order: [cleaning](super::clean) (weld, degenerate and duplicate faces, unused vertices, components),
+/// [simplification](super::decimate) above the working size, [small holes](super::holes), scale and place. Vertices
+/// added to holes come last and carry no signatures. The outcome does not depend on the position, size or units of
+/// the input, nor, up to order and unless the mesh is simplified, on the order of its vertices and faces.
+///
+/// Errors: [`MeshError::NoFaces`] for points only, [`MeshError::NotFinite`] and [`MeshError::IndexOutOfRange`] for
+/// soups that break their promise, [`MeshError::Degenerate`] when no face has an area, [`MeshError::TooSmall`] when
+/// fewer than 4 vertices or 2 faces are left.
+pub fn prepare(soup: TriangleSoup, options: &PrepareOptions) -> Result<(TriMesh, PrepareReport), MeshError> {
+    let mut report = PrepareReport::default();
+    let mut mesh = clean(soup, options.components, &mut report)?;
+    report.non_manifold_edges = edge_census(mesh.vertices.len(), &mesh.faces).non_manifold;
+
+    let before = mesh.vertices.len();
+    let simplified = simplify_to(&mut mesh, options.working_size, options.components)?;
+    report.simplified_from = (simplified != Simplified::No).then_some(before);
+
+    let Cleaned {
+        mut vertices,
+        mut faces,
+        scale,
+    } = mesh;
+    report.vertices = vertices.len();
+    report.holes_filled = fill_small_holes(&mut vertices, &mut faces, options.fill_holes_below);
+    report.faces = faces.len();
+
+    let boundary = edge_census(vertices.len(), &faces).boundary;
+    let mesh = TriMesh::new(vertices, faces, report.vertices)?;
+    let area = mesh.area();
+    report.boundary_edges = boundary.len();
+    report.openness = boundary_length(mesh.vertices(), &boundary) / area.sqrt();
+    // Clamped, as the squared units of a finite file may overflow and reports are written as JSON.
+    report.area = (area * scale * scale).min(f64::MAX);
+    report.warnings = warnings(&report, simplified);
+    Ok((mesh.normalised()?, report))
+}
+
+/// One sentence for everything that may surprise a user in the ranking.
+fn warnings(report: &PrepareReport, simplified: Simplified) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let mut warn = |condition: bool, sentence: String| {
+        if condition {
+            warnings.push(sentence);
+        }
+    };
+    warn(
+        10 * report.degenerate_faces > report.input_faces,
+        format!(
+            "{} of {} faces have no area and were dropped.",
+            report.degenerate_faces, report.input_faces
+        ),
+    );
+    warn(
+        report.area_dropped > 0.1,
+        format!(
+            "{} of {} separate parts were left out, with {:.0} % of the surface area.",
+            report.components_dropped,
+            report.components,
+            100.0 * report.area_dropped
+        ),
+    );
+    warn(
+        report.components > MANY_COMPONENTS,
+        format!(
+            "The mesh falls into {} separate parts; parts of one shape should be connected.",
+            report.components
+        ),
+    );
+    warn(
+        report.non_manifold_edges > 0,
+        format!("{} edges have more than two faces.", report.non_manifold_edges),
+    );
+    warn(
+        report.openness > OPEN,
+        format!(
+            "The surface is open: its boundary is {:.1} times the square root of its area.",
+            report.openness
+        ),
+    );
+    warn(
+        report.simplified_from.is_some(),
+        format!(
+            "The mesh was simplified from {} to {} vertices.",
+            report.simplified_from.unwrap_or_default(),
+            report.vertices
+        ),
+    );
+    warn(
+        simplified == Simplified::AcrossTopology,
+        "The simplification had to collapse across non-manifold places.".to_owned(),
+    );
+    warn(
+        simplified == Simplified::ByClustering,
+        "The mesh could not be simplified by edge collapses; its vertices were clustered, which may change its topology.".to_owned(),
+    );
+    warn(
+        report.vertices < FEW_VERTICES,
+        format!(
+            "Only {} vertices carry signatures; fewer than {FEW_VERTICES} describe a shape poorly.",
+            report.vertices
+        ),
+    );
+    warnings
 }

@@ -1,6 +1,6 @@
 //! One entrance for every format.
 
-use super::{Format, Limits, MeshError, TriangleSoup};
+use super::{Format, Limits, MeshError, TriangleSoup, detect, gltf, obj, off, ply, stl};
 
 /// A file that came with another one in the same upload, such as a glTF's `.bin`.
 #[derive(Clone, Debug)]
@@ -33,17 +33,51 @@ pub struct Pose {
     pub soup: TriangleSoup,
 }
 
-/// Reads one mesh: every mesh of an OBJ file or of a glTF's default scene merged into one, in bind pose.
-pub fn read(_source: &Source<'_>, _limits: &Limits) -> Result<(Format, TriangleSoup), MeshError> {
-    Err(MeshError::UnknownFormat)
+/// Reads one mesh: every mesh of an OBJ file or of a glTF's default scene merged into one, a skinned or morphing one
+/// in its resting pose (see [`super::gltf`]).
+///
+/// Vertices keep the file's order except where a format's reader says otherwise. Errors: every [`MeshError`] but
+/// [`MeshError::TooSmall`], [`MeshError::Degenerate`] and [`MeshError::NoAnimation`]. Hostile bytes end in an error,
+/// never in a panic or in an allocation beyond `limits`.
+pub fn read(source: &Source<'_>, limits: &Limits) -> Result<(Format, TriangleSoup), MeshError> {
+    let format = format_of(source, limits)?;
+    let soup = guarded(format, || match format {
+        Format::Obj => obj::read(source.bytes, limits),
+        Format::Gltf | Format::Glb => gltf::read(source, format, limits),
+        Format::Ply => ply::read(source.bytes, limits),
+        Format::Stl => stl::read(source.bytes, limits),
+        Format::Off => off::read(source.bytes, limits),
+    })?;
+    Ok((format, soup))
 }
 
-/// Samples `poses` poses of an animated glTF, spread evenly over its clips. A file without animation is refused with
-/// [`MeshError::NoAnimation`].
+/// Samples `poses` poses of an animated glTF, spread evenly over its clips (see [`super::gltf::read_poses`]). A file
+/// without animation, of whatever format, is refused with [`MeshError::NoAnimation`].
+///
+/// Errors as for [`read`], and [`MeshError::TooLarge`] for more poses than the limit or more vertices in all of them
+/// together than four times the limit of one mesh.
 pub fn read_poses(
-    _source: &Source<'_>,
-    _poses: usize,
-    _limits: &Limits,
+    source: &Source<'_>,
+    poses: usize,
+    limits: &Limits,
 ) -> Result<(Format, Vec<Pose>), MeshError> {
-    Err(MeshError::NoAnimation)
+    let format = format_of(source, limits)?;
+    limits.check_poses(poses)?;
+    let poses = guarded(format, || match format {
+        Format::Gltf | Format::Glb => gltf::read_poses(source, format, poses, limits),
+        Format::Obj | Format::Ply | Format::Stl | Format::Off => Err(MeshError::NoAnimation),
+    })?;
+    Ok((format, poses))
+}
+
+fn format_of(source: &Source<'_>, limits: &Limits) -> Result<Format, MeshError> {
+    limits.check_bytes(source.bytes.len())?;
+    detect::detect(source.bytes, source.media_type, source.name)
+}
+
+/// Runs a reader so that a panic inside a third-party parser is one more malformed file.
+fn guarded<T>(format: Format, reader: impl FnOnce() -> Result<T, MeshError>) -> Result<T, MeshError> {
+    // The readers own everything they change, so nothing half-changed can be seen after a panic.
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(reader))
+        .unwrap_or_else(|_| Err(MeshError::malformed(format, "the parser gave up on it")))
 }

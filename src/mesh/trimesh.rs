@@ -88,6 +88,46 @@ impl TriMesh {
         self.faces.iter().map(|f| face_area(&self.vertices, f)).sum()
     }
 
+    /// The area centroid μ = Σ_f w_f (a + b + c) / 3, where w_f is a face's share of the area.
+    pub fn centroid(&self) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        let mut total = 0.0;
+        for f in &self.faces {
+            let area = face_area(&self.vertices, f);
+            total += area;
+            for v in f {
+                for (s, x) in sum.iter_mut().zip(self.vertices[*v as usize]) {
+                    *s += area / 3.0 * x;
+                }
+            }
+        }
+        sum.map(|s| s / total)
+    }
+
+    /// The same mesh moved and scaled to unit area, its area centroid at the origin.
+    ///
+    /// Errors: [`MeshError::Degenerate`] where the area is too small or too large for the scaled coordinates to be
+    /// finite.
+    pub fn normalised(mut self) -> Result<Self, MeshError> {
+        let centroid = self.centroid();
+        let scale = 1.0 / self.area().sqrt();
+        for p in &mut self.vertices {
+            for (x, c) in p.iter_mut().zip(centroid) {
+                *x = (*x - c) * scale;
+            }
+        }
+        let area = self.area();
+        if !(area > 0.5 && area < 2.0) {
+            return Err(MeshError::Degenerate);
+        }
+        // One more step takes out the rounding of the first.
+        let correction = 1.0 / area.sqrt();
+        for x in self.vertices.iter_mut().flatten() {
+            *x *= correction;
+        }
+        Ok(self)
+    }
+
     /// The mesh's arrays, given up.
     pub fn into_parts(self) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
         (self.vertices, self.faces)

@@ -1,41 +1,10 @@
 //! Mesh → signatures, for training shapes and for queries.
 
-use super::PipelineError;
+use super::{PipelineError, PreparedShape, Stage};
 use crate::cancel::Cancel;
 use crate::mesh::{PrepareReport, TriangleSoup};
 use crate::parameters::Parameters;
 use crate::ranking::View;
-
-/// A stage of the data flow, announced as it begins so that a caller with a clock can time it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Stage {
-    /// Bytes → soup.
-    Read,
-    /// Soup → clean mesh.
-    Prepare,
-    /// Mesh → stiffness and mass.
-    Laplacian,
-    /// Operators → eigenpairs.
-    Eigenpairs,
-    /// Eigenpairs → signals.
-    Signatures,
-    /// Signals → codes and ranking.
-    Ranking,
-}
-
-impl Stage {
-    /// The stage's name on the wire and in metrics.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Read => "read",
-            Self::Prepare => "prepare",
-            Self::Laplacian => "laplacian",
-            Self::Eigenpairs => "eigenpairs",
-            Self::Signatures => "signatures",
-            Self::Ranking => "ranking",
-        }
-    }
-}
 
 /// Everything a shape's coding needs.
 #[derive(Clone, Debug)]
@@ -49,22 +18,55 @@ pub struct Description {
 }
 
 /// Describes a training shape: one view per channel of the parameters, `samples_per_shape` signatures each.
+///
+/// The vertices are drawn by area with the parameters' seed, so equal meshes give equal signatures.
+///
+/// # Errors
+/// The error of the stage that failed, or [`PipelineError::Cancelled`].
 pub fn describe_shape(
-    _soup: TriangleSoup,
-    _parameters: &Parameters,
-    _cancel: &Cancel,
-    _observer: &dyn Fn(Stage),
+    soup: TriangleSoup,
+    parameters: &Parameters,
+    cancel: &Cancel,
+    observer: &dyn Fn(Stage),
 ) -> Result<Description, PipelineError> {
-    Err(crate::mesh::MeshError::Degenerate.into())
+    let shape = PreparedShape::new(soup, parameters, cancel, observer)?;
+    let views = shape.training_views(parameters, cancel)?;
+    Ok(shape.into_description(views))
 }
 
 /// Describes a query: one view per hypothesis (an open surface's doubling gives one per assumed area),
 /// `query_samples` signatures each.
+///
+/// # Errors
+/// The error of the stage that failed, or [`PipelineError::Cancelled`].
 pub fn describe_query(
-    _soup: TriangleSoup,
-    _parameters: &Parameters,
-    _cancel: &Cancel,
-    _observer: &dyn Fn(Stage),
+    soup: TriangleSoup,
+    parameters: &Parameters,
+    cancel: &Cancel,
+    observer: &dyn Fn(Stage),
 ) -> Result<Description, PipelineError> {
-    Err(crate::mesh::MeshError::Degenerate.into())
+    let shape = PreparedShape::new(soup, parameters, cancel, observer)?;
+    let views = shape.query_views(parameters, cancel)?;
+    Ok(shape.into_description(views))
+}
+
+/// Describes one shape both as a training shape and as a query, from one spectrum: what an evaluation, in which every
+/// shape is both, needs.
+///
+/// # Errors
+/// As [`describe_shape`].
+pub fn describe_both(
+    soup: TriangleSoup,
+    parameters: &Parameters,
+    cancel: &Cancel,
+) -> Result<(Description, Description), PipelineError> {
+    let shape = PreparedShape::new(soup, parameters, cancel, &|_| ())?;
+    let training = shape.training_views(parameters, cancel)?;
+    let query = shape.query_views(parameters, cancel)?;
+    let query = Description {
+        views: query,
+        report: shape.report().clone(),
+        eigenvalues: shape.first_eigenvalues(),
+    };
+    Ok((shape.into_description(training), query))
 }

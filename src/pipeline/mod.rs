@@ -5,8 +5,12 @@
 pub mod describe;
 pub mod error;
 pub mod learn;
+pub mod prepared;
+pub mod stage;
 
 pub use crate::ranking::rank;
-pub use describe::{Description, Stage, describe_query, describe_shape};
+pub use describe::{Description, describe_both, describe_query, describe_shape};
 pub use error::PipelineError;
 pub use learn::{Model, ModelReport, learn_model};
+pub use prepared::PreparedShape;
+pub use stage::Stage;

@@ -12,6 +12,9 @@ pub enum RankingError {
     /// There is no class with a dictionary to rank by.
     #[error("the index is empty: no class has a dictionary yet")]
     EmptyIndex,
+    /// The query has no plain view, which every ranking starts from.
+    #[error("the query was not described under the plain hypothesis")]
+    NoPlainView,
     /// A class lacks the dictionary a view has to be coded under.
     #[error("class {class} has no dictionary for the {channel:?} channel")]
     MissingChannel { class: String, channel: Channel },

@@ -2,10 +2,12 @@
 
 pub mod error;
 pub mod index;
+pub mod rank;
 pub mod score;
 pub mod view;
 
 pub use error::RankingError;
 pub use index::{Index, IndexedClass, IndexedShape};
-pub use score::{ClassScore, Ranking, ShapeScore, rank};
+pub use rank::{ClassScore, Ranking, ShapeScore, rank};
+pub use score::{Errors, Score, score};
 pub use view::View;

@@ -1,71 +1,176 @@
-//! Class scores and their order (method, steps 8 to 10; Eq. 5).
+//! How well one set of dictionaries regenerates a query (method, steps 8 and 10; Eq. 5).
 
-use super::{Index, RankingError, View};
+use super::{RankingError, View};
 use crate::cancel::Cancel;
-use crate::parameters::{Hypothesis, RankBy};
-use serde::{Deserialize, Serialize};
+use crate::coding::{Codes, Dictionary, encode};
+use crate::parameters::{Channel, Hypothesis, RankBy};
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
-/// How well one class regenerates a query.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ClassScore {
-    /// The class's label in the index.
-    pub label: String,
-    /// What the ranking is ordered by, ascending: one of the errors below, by the parameters' `rank_by`, with the
-    /// hypotheses' offsets.
-    pub score: f64,
-    /// ‖S − DA‖_F (Eq. 5) of the plain hypothesis.
-    pub frobenius_error: f64,
-    /// ‖S − DA‖_F / ‖S‖_F of the plain hypothesis.
-    pub relative_error: f64,
-    /// Mean of ½‖s − Da‖² + λ‖a‖₁ over the signatures, plain hypothesis.
+/// What a class whitened by its second moments must be better by, in units of the mean objective: the prior against
+/// the less specific hypothesis (method, step 10).
+const WHITENED_OFFSET: f64 = 0.002;
+/// What an open query taken as it is must be better by.
+const OPEN_PLAIN_OFFSET: f64 = 0.001;
+/// Temperature τ of the soft minimum over the areas assumed for a doubled surface.
+const AREA_TEMPERATURE: f64 = 0.002;
+/// Share of the signatures, those with the smallest objectives, that the trimmed mean keeps.
+const TRIMMED_SHARE: f64 = 0.8;
+
+/// Errors of N coded signatures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Errors {
+    /// ‖S − DA‖_F (Eq. 5).
+    pub frobenius: f64,
+    /// ‖S − DA‖_F / ‖S‖_F.
+    pub relative: f64,
+    /// Mean of ½‖s − Da‖² + λ‖a‖₁.
     pub mean_objective: f64,
-    /// Mean of the smallest 80 % of the objectives, plain hypothesis.
+    /// Mean of the smallest 80 % of the objectives.
     pub trimmed_objective: f64,
-    /// Mean number of non-zeros of a code, plain hypothesis.
+    /// Mean number of non-zeros of a code.
     pub mean_nonzeros: f64,
-    /// The hypothesis the score comes from.
-    pub hypothesis: Hypothesis,
-    /// (score of the next class − score) / score of the next class; `None` for the last.
-    pub margin: Option<f64>,
 }
 
-/// How well one training shape regenerates a query.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ShapeScore {
-    /// The class's label in the index.
-    pub class: String,
-    /// The shape's label in the index.
-    pub label: String,
-    /// As [`ClassScore::score`].
-    pub score: f64,
-    /// ‖S − DA‖_F (Eq. 5) of the plain hypothesis.
-    pub frobenius_error: f64,
-}
-
-/// A query's answer.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Ranking {
-    /// All classes, best first.
-    pub classes: Vec<ClassScore>,
-    /// Shapes with a dictionary of their own, best first; empty where the index has none.
-    pub shapes: Vec<ShapeScore>,
-    /// Relative margin of the best class to the runner-up, 0 to 1; 1 where there is only one.
-    pub confidence: f64,
-    /// Signatures that were coded.
-    pub signatures: usize,
-}
-
-/// Codes a query under every dictionary of the index and orders the classes. Ties are broken by label, so the order
-/// never depends on the order of the index.
-pub fn rank(
-    _views: &[View],
-    index: &Index,
-    _rank_by: RankBy,
-    cancel: &Cancel,
-) -> Result<Ranking, RankingError> {
-    cancel.check().map_err(crate::coding::CodingError::from)?;
-    if index.classes.is_empty() {
-        return Err(RankingError::EmptyIndex);
+impl Errors {
+    /// Sums up the codes of N signals with ‖S‖²_F = `energy`.
+    pub fn of(codes: &Codes, energy: f64) -> Self {
+        let n = codes.objective.len().max(1) as f64;
+        let residual2: f64 = codes.residual2.iter().sum();
+        let frobenius = residual2.max(0.0).sqrt();
+        let mut sorted = codes.objective.clone();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let kept = ((sorted.len() as f64 * TRIMMED_SHARE).ceil() as usize).clamp(1, sorted.len().max(1));
+        Self {
+            frobenius,
+            relative: if energy > 0.0 {
+                frobenius / energy.sqrt()
+            } else {
+                0.0
+            },
+            mean_objective: codes.objective.iter().sum::<f64>() / n,
+            trimmed_objective: sorted.iter().take(kept).sum::<f64>() / kept as f64,
+            mean_nonzeros: codes.values.len() as f64 / n,
+        }
     }
-    Err(RankingError::EmptyIndex)
+
+    fn by(&self, rank_by: RankBy) -> f64 {
+        match rank_by {
+            RankBy::Objective => self.mean_objective,
+            RankBy::TrimmedObjective => self.trimmed_objective,
+            RankBy::Frobenius => self.frobenius,
+        }
+    }
+}
+
+/// A score, where it comes from, and the plain hypothesis's errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Score {
+    /// What the ranking is ordered by.
+    pub value: f64,
+    /// The hypothesis it comes from.
+    pub hypothesis: Hypothesis,
+    /// The plain hypothesis's errors.
+    pub plain: Errors,
+}
+
+/// Codes every view under the dictionary of its channel and combines the hypotheses.
+///
+/// With p = min(m₀, m₁ + 0.002): the score is p, or for an open query min(p + 0.001, m₂), m₂ the soft minimum
+/// −τ ln mean exp(−m/τ) over the areas assumed (method, step 10). Offsets are in units of the mean objective, so a
+/// ranking by Eq. 5 knows the plain hypothesis only.
+pub fn score(
+    views: &[View],
+    dictionaries: &BTreeMap<Channel, Arc<Dictionary>>,
+    lambda: f64,
+    rank_by: RankBy,
+    label: &str,
+    cancel: &Cancel,
+) -> Result<Score, RankingError> {
+    let mut plain = None;
+    let mut whitened = None;
+    let mut doubled = Vec::new();
+    for view in views {
+        if rank_by == RankBy::Frobenius && view.hypothesis != Hypothesis::Plain {
+            continue;
+        }
+        let dictionary = dictionaries
+            .get(&view.channel)
+            .ok_or_else(|| RankingError::MissingChannel {
+                class: label.to_owned(),
+                channel: view.channel,
+            })?;
+        let codes = encode(dictionary, view.signatures.matrix.as_ref(), lambda, cancel)?;
+        let errors = Errors::of(&codes, view.signatures.energy());
+        match view.hypothesis {
+            Hypothesis::Plain => plain = Some(errors),
+            Hypothesis::Whitened => whitened = Some(errors.by(rank_by)),
+            Hypothesis::Doubled => doubled.push(errors.by(rank_by)),
+        }
+    }
+    let plain = plain.ok_or(RankingError::NoPlainView)?;
+    let mut best = (plain.by(rank_by), Hypothesis::Plain);
+    if let Some(m1) = whitened.map(|m| m + WHITENED_OFFSET)
+        && m1 < best.0
+    {
+        best = (m1, Hypothesis::Whitened);
+    }
+    if !doubled.is_empty() {
+        best.0 += OPEN_PLAIN_OFFSET;
+        let m2 = soft_minimum(&doubled, AREA_TEMPERATURE);
+        if m2 < best.0 {
+            best = (m2, Hypothesis::Doubled);
+        }
+    }
+    Ok(Score {
+        value: best.0,
+        hypothesis: best.1,
+        plain,
+    })
+}
+
+/// −τ ln mean_s exp(−m_s/τ), the minimum subtracted first so that nothing underflows.
+fn soft_minimum(values: &[f64], temperature: f64) -> f64 {
+    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let mean = values
+        .iter()
+        .map(|m| (-(m - least) / temperature).exp())
+        .sum::<f64>()
+        / values.len() as f64;
+    least - temperature * mean.ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_soft_minimum_lies_between_the_minimum_and_the_mean() {
+        let values = [0.375, 0.376, 0.380];
+        let soft = soft_minimum(&values, AREA_TEMPERATURE);
+        assert!(soft > 0.375 && soft < values.iter().sum::<f64>() / 3.0, "{soft}");
+        assert!((soft_minimum(&[0.4; 4], AREA_TEMPERATURE) - 0.4).abs() < 1e-15);
+        // Far apart, only the number of hypotheses is left of the others: m + τ ln n.
+        let far = soft_minimum(&[0.1, 50.0], AREA_TEMPERATURE);
+        assert!(
+            (far - (0.1 + AREA_TEMPERATURE * 2f64.ln())).abs() < 1e-12,
+            "{far}"
+        );
+    }
+
+    #[test]
+    fn errors_sum_up_codes() {
+        let codes = Codes {
+            offsets: vec![0, 1, 3, 3, 4, 5],
+            atoms: vec![0, 0, 1, 2, 0],
+            values: vec![1.0; 5],
+            objective: vec![0.5, 0.1, 0.2, 0.3, 9.0],
+            residual2: vec![1.0, 0.5, 0.5, 1.0, 1.0],
+        };
+        let errors = Errors::of(&codes, 16.0);
+        assert_eq!(errors.frobenius, 2.0);
+        assert_eq!(errors.relative, 0.5);
+        assert!((errors.trimmed_objective - (0.1 + 0.2 + 0.3 + 0.5) / 4.0).abs() < 1e-15);
+        assert_eq!(errors.mean_nonzeros, 1.0);
+    }
 }

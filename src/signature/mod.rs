@@ -28,6 +28,11 @@ impl Signatures {
         self.matrix.nrows()
     }
 
+    /// ‖S‖²_F, the sum of all squared values.
+    pub fn energy(&self) -> f64 {
+        self.matrix.squared_norm_l2()
+    }
+
     /// N, the number of signatures.
     pub fn len(&self) -> usize {
         self.matrix.ncols()

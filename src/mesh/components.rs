@@ -1,0 +1,164 @@
+//! Connected components of a triangle list.
+//!
+//! Faces belong together when they share a vertex, not only an edge: that is what the Laplacian sees, whose null
+//! space has one dimension per such component.
+
+use super::prepare::Components;
+
+/// Share of the area below which [`Components::All`] leaves a component out.
+pub const SMALLEST_SHARE: f64 = 0.01;
+
+/// Relative difference below which two areas count as equal, so that rounding does not choose between twins.
+const AREA_TIE: f64 = 1e-9;
+
+/// Disjoint sets of 0..n with path halving; the smaller index is the representative.
+pub(super) struct DisjointSets {
+    parent: Vec<u32>,
+}
+
+impl DisjointSets {
+    /// n singletons.
+    pub fn new(n: usize) -> Self {
+        Self {
+            parent: (0..n as u32).collect(),
+        }
+    }
+
+    /// The representative of `x`'s set.
+    pub fn find(&mut self, mut x: u32) -> u32 {
+        while self.parent[x as usize] != x {
+            let up = self.parent[self.parent[x as usize] as usize];
+            self.parent[x as usize] = up;
+            x = up;
+        }
+        x
+    }
+
+    /// Merges the sets of `a` and `b`.
+    pub fn union(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.find(a), self.find(b));
+        if a != b {
+            self.parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+}
+
+/// What [`select`] kept.
+pub(super) struct Selection {
+    /// Faces of the kept components, in their order.
+    pub faces: Vec<[u32; 3]>,
+    /// Components found.
+    pub found: usize,
+    /// Components left out.
+    pub dropped: usize,
+    /// Area left out as a share of the total, 0 to 1.
+    pub area_dropped: f64,
+}
+
+/// Keeps the largest component or all with at least 1 % of the area; the largest stays in any case.
+///
+/// `areas` holds one area per face. Components of equal area (to 1e-9) are told apart by their lexicographically
+/// smallest vertex, so that the order of the faces does not matter.
+pub(super) fn select(
+    vertices: &[[f64; 3]],
+    faces: Vec<[u32; 3]>,
+    areas: &[f64],
+    keep: Components,
+) -> Selection {
+    let mut sets = DisjointSets::new(vertices.len());
+    for f in &faces {
+        sets.union(f[0], f[1]);
+        sets.union(f[0], f[2]);
+    }
+    let mut number = vec![u32::MAX; vertices.len()];
+    let mut component: Vec<(f64, [f64; 3])> = Vec::new(); // area, smallest vertex
+    let mut of_face = Vec::with_capacity(faces.len());
+    for (f, area) in faces.iter().zip(areas) {
+        let slot = &mut number[sets.find(f[0]) as usize];
+        if *slot == u32::MAX {
+            *slot = component.len() as u32;
+            component.push((0.0, vertices[f[0] as usize]));
+        }
+        let entry = &mut component[*slot as usize];
+        entry.0 += area;
+        for &v in f {
+            if vertices[v as usize] < entry.1 {
+                entry.1 = vertices[v as usize];
+            }
+        }
+        of_face.push(*slot);
+    }
+    let total: f64 = component.iter().map(|c| c.0).sum();
+    let largest_area = component.iter().map(|c| c.0).fold(0.0, f64::max);
+    let largest = component
+        .iter()
+        .enumerate()
+        .filter(|(_, c)| c.0 >= largest_area * (1.0 - AREA_TIE))
+        .min_by(|x, y| x.1.1.partial_cmp(&y.1.1).unwrap_or(std::cmp::Ordering::Equal))
+        .map_or(0, |(i, _)| i);
+    let kept: Vec<bool> = component
+        .iter()
+        .enumerate()
+        .map(|(i, c)| i == largest || (keep == Components::All && c.0 >= SMALLEST_SHARE * total))
+        .collect();
+    let area_kept: f64 = (component.iter().zip(&kept).filter(|(_, k)| **k).map(|(c, _)| c.0)).sum();
+    let dropped = kept.iter().filter(|k| !**k).count();
+    Selection {
+        faces: if dropped == 0 {
+            faces
+        } else {
+            (faces
+                .iter()
+                .zip(&of_face)
+                .filter(|(_, c)| kept[**c as usize])
+                .map(|(f, _)| *f))
+            .collect()
+        },
+        found: component.len(),
+        dropped,
+        area_dropped: if dropped == 0 || total <= 0.0 {
+            0.0
+        } else {
+            (1.0 - area_kept / total).clamp(0.0, 1.0)
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle_at(vertices: &mut Vec<[f64; 3]>, x: f64, side: f64) -> [u32; 3] {
+        let n = vertices.len() as u32;
+        vertices.extend([[x, 0.0, 0.0], [x + side, 0.0, 0.0], [x, side, 0.0]]);
+        [n, n + 1, n + 2]
+    }
+
+    #[test]
+    fn keeps_the_largest_or_all_above_one_percent() {
+        let mut vertices = Vec::new();
+        let faces: Vec<[u32; 3]> = [(0.0, 1.0), (5.0, 2.0), (10.0, 0.1)]
+            .iter()
+            .map(|&(x, side)| triangle_at(&mut vertices, x, side))
+            .collect();
+        let areas = [0.5, 2.0, 0.005];
+        let largest = select(&vertices, faces.clone(), &areas, Components::Largest);
+        assert_eq!(largest.faces, [[3, 4, 5]]);
+        assert_eq!((largest.found, largest.dropped), (3, 2));
+        assert!((largest.area_dropped - 0.505 / 2.505).abs() < 1e-12);
+        let all = select(&vertices, faces, &areas, Components::All);
+        assert_eq!(all.faces, [[0, 1, 2], [3, 4, 5]]);
+    }
+
+    #[test]
+    fn faces_that_share_only_a_vertex_are_one_component() {
+        let vertices = vec![[0.0; 3], [1.0; 3], [2.0; 3], [3.0; 3], [4.0; 3]];
+        let found = select(
+            &vertices,
+            vec![[0, 1, 2], [2, 3, 4]],
+            &[1.0, 1.0],
+            Components::Largest,
+        );
+        assert_eq!((found.found, found.dropped), (1, 0));
+    }
+}

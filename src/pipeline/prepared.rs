@@ -1,0 +1,247 @@
+//! A clean mesh and its spectrum, from which every view is taken.
+
+use super::{Description, PipelineError, Stage};
+use crate::cancel::Cancel;
+use crate::mesh::double::double;
+use crate::mesh::whiten::whiten;
+use crate::mesh::{PrepareReport, TriMesh, TriangleSoup, prepare};
+use crate::parameters::{Channel, Hypothesis, Parameters};
+use crate::ranking::View;
+use crate::signature::describe_vertices;
+use crate::signature::descriptor::{Descriptor, DescriptorParameters, WksRange};
+use crate::signature::normalise::normalise;
+use crate::signature::sample::sample_by_area;
+use crate::spectral::{EigenOptions, Eigenpairs, Operators, assemble, smallest_eigenpairs};
+
+/// A query with a boundary longer than this many √area is open: a single view has 8 to 16, a half sphere 2.507.
+const OPEN_ABOVE: f64 = 2.5;
+/// Full area over visible area, as assumed for an open query (method, step 10).
+const AREA_SCALES: [f64; 4] = [2.0, 2.5, 3.0, 4.0];
+/// How many eigenvalues a description reports.
+const REPORTED_EIGENVALUES: usize = 20;
+/// The grid that doubled surfaces and training shapes share: 100 energies from log 10 to log 3000, σ of 6 steps.
+const FIXED_GRID: DescriptorParameters = DescriptorParameters {
+    descriptor: Descriptor::Wks,
+    dimension: 100,
+    sigma_steps: 6.0,
+    range: WksRange::Fixed {
+        low: std::f64::consts::LN_10,
+        high: 8.006_367_567_650_246,
+    },
+};
+
+/// A mesh with the spectrum of its plain view, which most views share.
+#[derive(Clone, Debug)]
+pub struct PreparedShape {
+    mesh: TriMesh,
+    operators: Operators,
+    eigenpairs: Eigenpairs,
+    report: PrepareReport,
+}
+
+impl PreparedShape {
+    /// Cleans a mesh and solves for its spectrum.
+    ///
+    /// # Errors
+    /// The error of the stage that failed, or [`PipelineError::Cancelled`].
+    pub fn new(
+        soup: TriangleSoup,
+        parameters: &Parameters,
+        cancel: &Cancel,
+        observer: &dyn Fn(Stage),
+    ) -> Result<Self, PipelineError> {
+        observer(Stage::Prepare);
+        let (mesh, report) = prepare(soup, &parameters.prepare_options())?;
+        cancel.check()?;
+        observer(Stage::Laplacian);
+        let operators = assemble(&mesh)?;
+        observer(Stage::Eigenpairs);
+        let eigenpairs = smallest_eigenpairs(
+            &operators,
+            parameters.eigenpairs,
+            &EigenOptions::default(),
+            cancel,
+        )?;
+        observer(Stage::Signatures);
+        Ok(Self {
+            mesh,
+            operators,
+            eigenpairs,
+            report,
+        })
+    }
+
+    /// What preparing did.
+    pub fn report(&self) -> &PrepareReport {
+        &self.report
+    }
+
+    /// The plain view's eigenpairs.
+    pub fn eigenpairs(&self) -> &Eigenpairs {
+        &self.eigenpairs
+    }
+
+    /// The views of a training shape: one per channel.
+    pub fn training_views(
+        &self,
+        parameters: &Parameters,
+        cancel: &Cancel,
+    ) -> Result<Vec<View>, PipelineError> {
+        let vertices = self.sample(parameters.samples_per_shape, parameters.seed);
+        parameters
+            .hypotheses
+            .iter()
+            .map(|hypothesis| match hypothesis {
+                Hypothesis::Plain => self.plain(&vertices, parameters),
+                Hypothesis::Whitened => self.whitened(&vertices, parameters, cancel),
+                Hypothesis::Doubled => self.fixed_grid(&vertices, parameters),
+            })
+            .collect()
+    }
+
+    /// The views of a query: one per hypothesis and assumed area.
+    pub fn query_views(&self, parameters: &Parameters, cancel: &Cancel) -> Result<Vec<View>, PipelineError> {
+        let vertices = self.sample(parameters.query_samples, parameters.seed);
+        let mut views = Vec::new();
+        for hypothesis in &parameters.hypotheses {
+            match hypothesis {
+                Hypothesis::Plain => views.push(self.plain(&vertices, parameters)?),
+                Hypothesis::Whitened => views.push(self.whitened(&vertices, parameters, cancel)?),
+                Hypothesis::Doubled if self.report.openness > OPEN_ABOVE => {
+                    views.extend(self.doubled(&vertices, parameters, cancel)?);
+                }
+                Hypothesis::Doubled => {}
+            }
+        }
+        Ok(views)
+    }
+
+    /// Vertices that give signatures: those the file had, at most `count` of them, drawn by area.
+    pub fn sample(&self, count: usize, seed: u64) -> Vec<u32> {
+        sample_by_area(
+            &self.operators.mass[..self.mesh.signature_vertices()],
+            count,
+            seed,
+        )
+    }
+
+    fn plain(&self, vertices: &[u32], parameters: &Parameters) -> Result<View, PipelineError> {
+        view(
+            &self.eigenpairs,
+            vertices,
+            parameters,
+            Hypothesis::Plain,
+            Channel::Plain,
+            1.0,
+        )
+    }
+
+    fn fixed_grid(&self, vertices: &[u32], parameters: &Parameters) -> Result<View, PipelineError> {
+        view(
+            &self.eigenpairs,
+            vertices,
+            parameters,
+            Hypothesis::Doubled,
+            Channel::FixedGrid,
+            1.0,
+        )
+    }
+
+    fn whitened(
+        &self,
+        vertices: &[u32],
+        parameters: &Parameters,
+        cancel: &Cancel,
+    ) -> Result<View, PipelineError> {
+        let operators = assemble(&whiten(&self.mesh)?)?;
+        let eigenpairs = smallest_eigenpairs(
+            &operators,
+            parameters.eigenpairs,
+            &EigenOptions::default(),
+            cancel,
+        )?;
+        view(
+            &eigenpairs,
+            vertices,
+            parameters,
+            Hypothesis::Whitened,
+            Channel::Whitened,
+            1.0,
+        )
+    }
+
+    /// One view per assumed area: the doubled surface has area 1, so a full area of s times the visible half's
+    /// multiplies its eigenvalues by s/2.
+    fn doubled(
+        &self,
+        vertices: &[u32],
+        parameters: &Parameters,
+        cancel: &Cancel,
+    ) -> Result<Vec<View>, PipelineError> {
+        let operators = assemble(&double(&self.mesh)?)?;
+        let doubled = smallest_eigenpairs(
+            &operators,
+            parameters.eigenpairs,
+            &EigenOptions::default(),
+            cancel,
+        )?;
+        AREA_SCALES
+            .iter()
+            .map(|&scale| {
+                let mut scaled = doubled.clone();
+                scaled.values.iter_mut().for_each(|v| *v *= scale / 2.0);
+                view(
+                    &scaled,
+                    vertices,
+                    parameters,
+                    Hypothesis::Doubled,
+                    Channel::FixedGrid,
+                    scale,
+                )
+            })
+            .collect()
+    }
+
+    /// Keeps the views and what is reported, gives up the rest.
+    pub fn into_description(self, views: Vec<View>) -> Description {
+        let eigenvalues = self.first_eigenvalues();
+        Description {
+            views,
+            report: self.report,
+            eigenvalues,
+        }
+    }
+
+    /// The first eigenvalues of the plain view, dimensionless.
+    pub fn first_eigenvalues(&self) -> Vec<f64> {
+        self.eigenpairs
+            .values
+            .iter()
+            .take(REPORTED_EIGENVALUES)
+            .copied()
+            .collect()
+    }
+}
+
+/// Signals of the given vertices, normalised.
+fn view(
+    eigenpairs: &Eigenpairs,
+    vertices: &[u32],
+    parameters: &Parameters,
+    hypothesis: Hypothesis,
+    channel: Channel,
+    area_scale: f64,
+) -> Result<View, PipelineError> {
+    let descriptor = match channel {
+        Channel::FixedGrid => FIXED_GRID,
+        Channel::Plain | Channel::Whitened => parameters.descriptor_parameters(),
+    };
+    let mut signatures = describe_vertices(eigenpairs, vertices, &descriptor)?;
+    normalise(&mut signatures, parameters.normalisation);
+    Ok(View {
+        hypothesis,
+        channel,
+        area_scale,
+        signatures,
+    })
+}
