@@ -23,3 +23,10 @@ pub mod pipeline;
 pub mod ranking;
 pub mod signature;
 pub mod spectral;
+
+#[cfg(feature = "service")]
+pub mod jobs;
+#[cfg(feature = "service")]
+pub mod model;
+#[cfg(feature = "service")]
+pub mod store;

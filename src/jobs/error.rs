@@ -1,0 +1,53 @@
+//! Why a job could not be queued, found or stopped.
+
+use crate::model::{JobId, JobState};
+use crate::store::StoreError;
+
+/// The job queue's errors.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum JobError {
+    /// The queue is as long as it may be.
+    #[error("{limit} jobs are waiting, as many as may; try again when some are done")]
+    QueueFull {
+        /// The longest the queue may be.
+        limit: usize,
+    },
+    /// There is no such job.
+    #[error("there is no job {id}")]
+    NoJob {
+        /// The identifier asked for.
+        id: JobId,
+    },
+    /// The job ended already, so it cannot be cancelled.
+    #[error("job {id} has {} already", state.name())]
+    Finished {
+        /// The job.
+        id: JobId,
+        /// How it ended.
+        state: JobState,
+    },
+    /// The parameters of the job are not usable.
+    #[error(transparent)]
+    Parameter(#[from] crate::parameters::ParameterError),
+    /// The service is going down.
+    #[error("the service is shutting down")]
+    ShuttingDown,
+    /// The worker could not be started.
+    #[error("the indexing worker could not be started: {detail}")]
+    NoWorker {
+        /// The failure.
+        detail: String,
+    },
+    /// The store failed.
+    #[error(transparent)]
+    Store(StoreError),
+}
+
+impl From<StoreError> for JobError {
+    fn from(error: StoreError) -> Self {
+        match error {
+            StoreError::NoJob { id } => Self::NoJob { id },
+            other => Self::Store(other),
+        }
+    }
+}

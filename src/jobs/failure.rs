@@ -1,0 +1,57 @@
+//! Why a reindex ended early, and the stable names of failures.
+
+use crate::model::JobFailure;
+use crate::pipeline::PipelineError;
+use crate::store::StoreError;
+use std::any::Any;
+
+/// Why a reindex ended early.
+#[derive(Debug)]
+pub(super) enum ReindexError {
+    /// Somebody asked it to stop.
+    Cancelled,
+    /// It cannot be done.
+    Failed(JobFailure),
+}
+
+impl ReindexError {
+    pub(super) fn failed(code: &str, detail: impl Into<String>) -> Self {
+        Self::Failed(JobFailure {
+            code: code.to_owned(),
+            detail: detail.into(),
+        })
+    }
+}
+
+impl From<StoreError> for ReindexError {
+    fn from(error: StoreError) -> Self {
+        let code = match &error {
+            StoreError::Full { .. } => "storage_full",
+            StoreError::ReadOnly { .. } => "storage_read_only",
+            StoreError::Damaged { .. } => "storage_damaged",
+            _ => "storage_failed",
+        };
+        Self::failed(code, error.to_string())
+    }
+}
+
+/// The stable name of a stage's failure.
+pub(super) fn code(error: &PipelineError) -> &'static str {
+    match error {
+        PipelineError::Cancelled(_) => "cancelled",
+        PipelineError::Mesh(_) => "mesh_unusable",
+        PipelineError::Spectral(_) => "spectrum_failed",
+        PipelineError::Coding(_) => "coding_failed",
+        PipelineError::Ranking(_) => "ranking_failed",
+        PipelineError::Parameter(_) => "invalid_parameters",
+    }
+}
+
+/// What a panic said.
+pub(super) fn panic_text(panic: &(dyn Any + Send)) -> &str {
+    panic
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no message")
+}

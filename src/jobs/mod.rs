@@ -1,0 +1,295 @@
+//! The durable, bounded job queue, the worker that learns the index, and the live index queries run against.
+//!
+//! Jobs run one at a time, in the order they were asked for, each on a pool of a few threads. A job that was running
+//! when the process died is queued again at the next start; one that was running at shutdown goes back to the queue.
+
+mod describe;
+pub mod error;
+mod failure;
+mod live;
+mod plan;
+mod progress;
+mod reindex;
+mod worker;
+
+pub use error::JobError;
+pub use live::LiveIndex;
+
+use crate::cancel::Cancel;
+use crate::mesh::Limits;
+use crate::model::{Job, JobId, JobKind, JobState};
+use crate::store::Store;
+use arc_swap::ArcSwap;
+use jiff::Timestamp;
+use std::collections::{HashMap, VecDeque};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::sync::watch;
+
+/// How jobs are run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JobOptions {
+    /// Threads of the indexing pool.
+    pub indexing_threads: usize,
+    /// Jobs that may wait.
+    pub queue_limit: usize,
+    /// What reading a shape's file may build.
+    pub limits: Limits,
+}
+
+impl Default for JobOptions {
+    /// One thread less than there are cores, at least one; 1000 waiting jobs; the default limits.
+    fn default() -> Self {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        Self {
+            indexing_threads: cores.saturating_sub(1).max(1),
+            queue_limit: 1000,
+            limits: Limits::default(),
+        }
+    }
+}
+
+/// The job queue with its worker and the live index. Cheap to clone; every clone is the same queue. The worker stops
+/// when the last clone is dropped.
+#[derive(Clone)]
+pub struct Jobs {
+    inner: Arc<Inner>,
+    _last: Arc<StopOnDrop>,
+}
+
+struct Inner {
+    store: Store,
+    options: JobOptions,
+    live: ArcSwap<LiveIndex>,
+    pool: rayon::ThreadPool,
+    state: Mutex<State>,
+    /// Told of every change of `state` the worker or a shutdown waits for.
+    changed: Condvar,
+    depth: AtomicUsize,
+}
+
+#[derive(Default)]
+struct State {
+    waiting: VecDeque<JobId>,
+    running: Option<Running>,
+    /// One per job that is not finished.
+    channels: HashMap<JobId, watch::Sender<Job>>,
+    stopping: bool,
+    stopped: bool,
+}
+
+struct Running {
+    id: JobId,
+    cancel: Cancel,
+    /// Whether somebody asked for the cancellation; else a shutdown did.
+    on_request: bool,
+}
+
+struct StopOnDrop(Arc<Inner>);
+
+impl Drop for StopOnDrop {
+    fn drop(&mut self) {
+        self.0.stop();
+        self.0.wait_stopped(Duration::from_secs(10));
+    }
+}
+
+impl Inner {
+    fn state(&self) -> MutexGuard<'_, State> {
+        // Nothing below panics while it holds the lock half-way through a change.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn stop(&self) {
+        let mut state = self.state();
+        state.stopping = true;
+        if let Some(running) = &state.running {
+            running.cancel.cancel();
+        }
+        self.changed.notify_all();
+    }
+
+    fn wait_stopped(&self, deadline: Duration) -> bool {
+        let end = Instant::now() + deadline;
+        let mut state = self.state();
+        while !state.stopped {
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return false;
+            }
+            state = self
+                .changed
+                .wait_timeout(state, left)
+                .unwrap_or_else(PoisonError::into_inner)
+                .0;
+        }
+        true
+    }
+
+    fn count(&self, state: &State) {
+        let depth = state.waiting.len() + usize::from(state.running.is_some());
+        self.depth.store(depth, Ordering::Relaxed);
+    }
+}
+
+impl Jobs {
+    /// Loads the live index, queues interrupted jobs again and starts the worker. An index that was lost, or cannot be
+    /// loaded, is queued to be learnt again; queries find it empty until then.
+    ///
+    /// # Errors
+    /// [`JobError::Store`] where the jobs cannot be read, [`JobError::NoWorker`] where no thread can be started.
+    pub fn start(store: Store, options: JobOptions) -> Result<Self, JobError> {
+        let no_worker = |detail: String| JobError::NoWorker { detail };
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(options.indexing_threads.max(1))
+            .thread_name(|i| format!("indexing-{i}"))
+            .build()
+            .map_err(|e| no_worker(e.to_string()))?;
+        let (live, lost) = live::load(&store)?;
+        let inner = Arc::new(Inner {
+            store,
+            options,
+            live: ArcSwap::from_pointee(live),
+            pool,
+            state: Mutex::default(),
+            changed: Condvar::new(),
+            depth: AtomicUsize::new(0),
+        });
+        worker::requeue_interrupted(&inner)?;
+        let for_worker = Arc::clone(&inner);
+        std::thread::Builder::new()
+            .name("jobs".to_owned())
+            .spawn(move || worker::run(&for_worker))
+            .map_err(|e| no_worker(e.to_string()))?;
+        let jobs = Self {
+            _last: Arc::new(StopOnDrop(Arc::clone(&inner))),
+            inner,
+        };
+        if lost && jobs.queue_depth() == 0 {
+            tracing::warn!("the index has to be learnt again; a reindex is queued");
+            jobs.enqueue(JobKind::Reindex {
+                scope: crate::model::ReindexScope::Stale,
+                parameters: None,
+            })?;
+        }
+        Ok(jobs)
+    }
+
+    /// Queues a job. It is durable when this returns.
+    ///
+    /// # Errors
+    /// [`JobError::Parameter`]; [`JobError::QueueFull`]; [`JobError::ShuttingDown`]; [`JobError::Store`].
+    pub fn enqueue(&self, kind: JobKind) -> Result<Job, JobError> {
+        let JobKind::Reindex { parameters, .. } = &kind;
+        if let Some(parameters) = parameters {
+            parameters.validate()?;
+        }
+        let limit = self.inner.options.queue_limit;
+        let mut state = self.inner.state();
+        if state.stopping {
+            return Err(JobError::ShuttingDown);
+        }
+        if state.waiting.len() >= limit {
+            return Err(JobError::QueueFull { limit });
+        }
+        let job = Job::new(kind, Timestamp::now());
+        self.inner.store.put_job(&job, true)?;
+        state.waiting.push_back(job.id);
+        state.channels.insert(job.id, watch::Sender::new(job.clone()));
+        self.inner.count(&state);
+        self.inner.changed.notify_all();
+        Ok(job)
+    }
+
+    /// A job as it stands now.
+    ///
+    /// # Errors
+    /// [`JobError::NoJob`]; [`JobError::Store`].
+    pub fn job(&self, id: JobId) -> Result<Job, JobError> {
+        if let Some(channel) = self.inner.state().channels.get(&id) {
+            return Ok(channel.borrow().clone());
+        }
+        Ok(self.inner.store.job(id)?)
+    }
+
+    /// Up to `limit` jobs, newest first, those older than `before` only.
+    ///
+    /// # Errors
+    /// [`JobError::Store`].
+    pub fn list(&self, before: Option<JobId>, limit: usize) -> Result<Vec<Job>, JobError> {
+        let mut jobs = self.inner.store.list_jobs(before, limit)?;
+        let state = self.inner.state();
+        for job in &mut jobs {
+            if let Some(channel) = state.channels.get(&job.id) {
+                job.clone_from(&channel.borrow());
+            }
+        }
+        Ok(jobs)
+    }
+
+    /// Cancels a job: at once where it waits; where it runs, at its next look, so it may still be `processing` in the
+    /// answer, and may even succeed if it was at its end.
+    ///
+    /// # Errors
+    /// [`JobError::NoJob`]; [`JobError::Finished`]; [`JobError::Store`].
+    pub fn cancel(&self, id: JobId) -> Result<Job, JobError> {
+        let mut state = self.inner.state();
+        let Some(mut job) = state.channels.get(&id).map(|channel| channel.borrow().clone()) else {
+            drop(state);
+            let job = self.inner.store.job(id)?;
+            return Err(JobError::Finished { id, state: job.state });
+        };
+        if let Some(running) = &mut state.running
+            && running.id == id
+        {
+            running.on_request = true;
+            running.cancel.cancel();
+            return Ok(job);
+        }
+        job.state = JobState::Canceled;
+        job.finished_at = Some(Timestamp::now());
+        self.inner.store.put_job(&job, true)?;
+        state.waiting.retain(|waiting| *waiting != id);
+        if let Some(channel) = state.channels.remove(&id) {
+            channel.send_replace(job.clone());
+        }
+        self.inner.count(&state);
+        Ok(job)
+    }
+
+    /// Follows a job. The channel holds its latest state, and closes after the final one; a job that is finished
+    /// already gives a channel that is closed and holds it.
+    ///
+    /// # Errors
+    /// [`JobError::NoJob`]; [`JobError::Store`].
+    pub fn subscribe(&self, id: JobId) -> Result<watch::Receiver<Job>, JobError> {
+        if let Some(channel) = self.inner.state().channels.get(&id) {
+            return Ok(channel.subscribe());
+        }
+        Ok(watch::Sender::new(self.inner.store.job(id)?).subscribe())
+    }
+
+    /// The index queries run against. Never blocks; hold it for as long as a query runs, and it stays what it is.
+    pub fn live_index(&self) -> Arc<LiveIndex> {
+        self.inner.live.load_full()
+    }
+
+    /// Jobs waiting or being worked on. Never blocks.
+    pub fn queue_depth(&self) -> usize {
+        self.inner.depth.load(Ordering::Relaxed)
+    }
+
+    /// Whether the worker takes jobs; readiness asks.
+    pub fn is_running(&self) -> bool {
+        let state = self.inner.state();
+        !state.stopping && !state.stopped
+    }
+
+    /// Stops the worker; a running job goes back to the queue, for the next start. Waits up to the deadline and says
+    /// whether the worker has ended by then.
+    pub fn shutdown(&self, deadline: Duration) -> bool {
+        self.inner.stop();
+        self.inner.wait_stopped(deadline)
+    }
+}

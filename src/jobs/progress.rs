@@ -1,0 +1,63 @@
+//! How far a job is: sent to whoever follows it at once, written to the store every half second.
+
+use crate::model::{Job, Step};
+use crate::store::Store;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+use tokio::sync::watch;
+
+const WRITE_EVERY: Duration = Duration::from_millis(500);
+
+/// The progress of one running job. Shared by the threads that work on it.
+pub(super) struct Progress {
+    store: Store,
+    channel: watch::Sender<Job>,
+    written: Mutex<Instant>,
+}
+
+impl Progress {
+    pub(super) fn new(store: Store, channel: watch::Sender<Job>) -> Self {
+        Self {
+            store,
+            channel,
+            written: Mutex::new(Instant::now()),
+        }
+    }
+
+    /// Begins a step.
+    pub(super) fn begin(&self, name: &str, total: usize) {
+        self.channel.send_modify(|job| {
+            job.steps.push(Step {
+                name: name.to_owned(),
+                finished: 0,
+                total,
+            });
+        });
+        self.write();
+    }
+
+    /// Counts one more in the step that began last.
+    pub(super) fn advance(&self) {
+        self.channel.send_modify(|job| {
+            if let Some(step) = job.steps.last_mut() {
+                step.finished = (step.finished + 1).min(step.total);
+            }
+        });
+        self.write();
+    }
+
+    fn write(&self) {
+        // Whoever finds another thread at it leaves it to that one.
+        let Ok(mut written) = self.written.try_lock() else {
+            return;
+        };
+        if written.elapsed() < WRITE_EVERY {
+            return;
+        }
+        *written = Instant::now();
+        let job = self.channel.borrow().clone();
+        if let Err(error) = self.store.put_job(&job, false) {
+            tracing::warn!(%error, job = %job.id, "progress was not written");
+        }
+    }
+}

@@ -1,0 +1,289 @@
+//! Learning the index: describe the shapes, learn the classes, switch.
+
+use super::describe::Describer;
+use super::failure::{ReindexError, code};
+use super::live::LiveIndex;
+use super::plan::{Plan, ToLearn, plan, shape_key, skipped};
+use super::progress::Progress;
+use crate::cancel::Cancel;
+use crate::mesh::Limits;
+use crate::model::{
+    FailedShape, Generation, GenerationClass, GenerationShape, ReindexReport, ReindexScope, RelearnedClass,
+    Shape, SkippedClass,
+};
+use crate::parameters::Parameters;
+use crate::pipeline::{Description, PipelineError, learn_model};
+use crate::store::{Store, StoreError};
+use arc_swap::ArcSwap;
+use jiff::Timestamp;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// What is asked, and with what.
+pub(super) struct Reindex<'a> {
+    pub(super) store: &'a Store,
+    pub(super) limits: &'a Limits,
+    pub(super) cancel: &'a Cancel,
+    pub(super) progress: &'a Progress,
+    pub(super) scope: &'a ReindexScope,
+    pub(super) parameters: Option<&'a Parameters>,
+}
+
+/// What came of it.
+pub(super) struct Outcome {
+    /// The generation that is current now; `None` where there is nothing to index and never was.
+    pub(super) generation: Option<u64>,
+    pub(super) report: ReindexReport,
+}
+
+enum Learnt {
+    Class(Box<GenerationClass>, Vec<FailedShape>),
+    Skipped(SkippedClass, Vec<FailedShape>),
+}
+
+/// Runs a reindex on the current rayon pool and swaps the live index at its end. Cancelled at any point before the
+/// switch, it leaves the index as it was; descriptions made so far stay cached.
+pub(super) fn reindex(request: &Reindex<'_>, live: &ArcSwap<LiveIndex>) -> Result<Outcome, ReindexError> {
+    let store = request.store;
+    let parameters = match request.parameters {
+        Some(parameters) => parameters.clone(),
+        None => store.parameters()?,
+    };
+    parameters
+        .validate()
+        .map_err(|e| ReindexError::failed("invalid_parameters", e.to_string()))?;
+    let current = match store.generation() {
+        // A generation that cannot be read is learnt anew.
+        Err(StoreError::Damaged { .. }) => None,
+        other => other?,
+    };
+    let Plan { learn, keep, skip } = plan(store, current.as_ref(), request.scope, &parameters)?;
+    let mut report = ReindexReport {
+        reused: keep.iter().map(|class| class.class).collect(),
+        skipped: skip,
+        ..ReindexReport::default()
+    };
+    let mut classes = keep;
+    learn_classes(request, &parameters, &learn, &mut classes, &mut report)?;
+    stop_if_cancelled(request)?;
+    request.progress.begin("switch", 1);
+    let generation = switch(store, current, parameters, classes, live)?;
+    request.progress.advance();
+    Ok(Outcome { generation, report })
+}
+
+fn stop_if_cancelled(request: &Reindex<'_>) -> Result<(), ReindexError> {
+    request.cancel.check().map_err(|_| ReindexError::Cancelled)
+}
+
+/// Describes and learns what the plan asks for; adds to the classes of the generation and to the report.
+fn learn_classes(
+    request: &Reindex<'_>,
+    parameters: &Parameters,
+    learn: &[ToLearn],
+    classes: &mut Vec<GenerationClass>,
+    report: &mut ReindexReport,
+) -> Result<(), ReindexError> {
+    let describer = Describer {
+        store: request.store,
+        limits: request.limits,
+        parameters,
+        fingerprint: parameters.description_fingerprint(),
+        cancel: request.cancel,
+    };
+    let shapes: Vec<&Shape> = learn.iter().flat_map(|class| &class.shapes).collect();
+    request.progress.begin("describe shapes", shapes.len());
+    let described = describer.describe_all(&shapes, request.progress)?;
+    report.described = described.computed;
+    report.described_before = described.cached;
+    if !shapes.is_empty()
+        && shapes
+            .iter()
+            .all(|shape| described.failures.contains_key(&shape.identity()))
+    {
+        let first = described.failures.values().next();
+        return Err(ReindexError::failed(
+            "all_shapes_failed",
+            format!(
+                "none of {} shapes could be described; the first: {}",
+                shapes.len(),
+                first.map_or("", |failure| &failure.detail)
+            ),
+        ));
+    }
+
+    request.progress.begin("learn classes", learn.len());
+    let learnt: Vec<Learnt> = learn
+        .par_iter()
+        .with_max_len(1)
+        .map(|class| {
+            let mut failed = Vec::new();
+            let mut good = Vec::new();
+            for shape in &class.shapes {
+                match described.failures.get(&shape.identity()) {
+                    Some(failure) => failed.push(failure.of(shape)),
+                    None => good.push(shape),
+                }
+            }
+            let learnt = learn_class(request, parameters, &describer, class, &good, failed);
+            request.progress.advance();
+            learnt
+        })
+        .collect::<Result<_, ReindexError>>()?;
+
+    let tried = learnt.len();
+    for learnt in learnt {
+        let failed = match learnt {
+            Learnt::Class(class, failed) => {
+                report.relearned.push(RelearnedClass {
+                    class: class.class,
+                    name: class.name.as_str().to_owned(),
+                    shapes: class.shapes,
+                });
+                classes.push(*class);
+                failed
+            }
+            Learnt::Skipped(class, failed) => {
+                report.skipped.push(class);
+                failed
+            }
+        };
+        report.failed_shapes.extend(failed);
+    }
+    if tried > 0 && report.relearned.is_empty() {
+        let reason = report.skipped.last().map_or("", |class| &class.reason);
+        return Err(ReindexError::failed(
+            "no_class_learnt",
+            format!("none of {tried} classes could be learnt; the last: {reason}"),
+        ));
+    }
+    classes.sort_by_key(|class| class.class);
+    Ok(())
+}
+
+fn learn_class(
+    request: &Reindex<'_>,
+    parameters: &Parameters,
+    describer: &Describer<'_>,
+    class: &ToLearn,
+    shapes: &[&Shape],
+    mut failed: Vec<FailedShape>,
+) -> Result<Learnt, ReindexError> {
+    stop_if_cancelled(request)?;
+    let (id, name) = (class.class.id, class.class.name.as_str());
+    let mut descriptions: Vec<(&Shape, Description)> = Vec::new();
+    for shape in shapes {
+        match describer.description(shape) {
+            Ok(description) => descriptions.push((shape, description)),
+            Err(_) if request.cancel.is_cancelled() => return Err(ReindexError::Cancelled),
+            Err(failure) => failed.push(failure.of(shape)),
+        }
+    }
+    if descriptions.is_empty() {
+        let class = skipped(id, name, "none of its shapes could be described");
+        return Ok(Learnt::Skipped(class, failed));
+    }
+    let all: Vec<&Description> = descriptions.iter().map(|(_, description)| description).collect();
+    let model = match learn_model(&all, parameters, request.cancel, &|_, _| {}) {
+        Ok(model) => model,
+        Err(PipelineError::Cancelled(_)) => return Err(ReindexError::Cancelled),
+        Err(error) => {
+            let class = skipped(id, name, &format!("{}: {error}", code(&error)));
+            return Ok(Learnt::Skipped(class, failed));
+        }
+    };
+    let mut bytes = request.store.put_dictionaries(&class.key, &model.dictionaries)?;
+    let mut shape_dictionaries = Vec::new();
+    if parameters.per_shape {
+        for (shape, description) in &descriptions {
+            match learn_shape(request, parameters, shape, description)? {
+                Ok((entry, size)) => {
+                    shape_dictionaries.push(entry);
+                    bytes += size;
+                }
+                Err(error) => failed.push(FailedShape {
+                    class: id,
+                    shape: shape.id,
+                    code: code(&error).to_owned(),
+                    detail: error.to_string(),
+                }),
+            }
+        }
+    }
+    Ok(Learnt::Class(
+        Box::new(GenerationClass {
+            class: id,
+            name: class.class.name.clone(),
+            revision: class.class.revision,
+            shapes: descriptions.len(),
+            dictionary: class.key.clone(),
+            bytes,
+            atoms: model.dictionaries.values().map(|d| d.len()).sum(),
+            report: model.report,
+            shape_dictionaries,
+        }),
+        failed,
+    ))
+}
+
+/// A shape's own dictionaries, those of an earlier generation where they are still there.
+fn learn_shape(
+    request: &Reindex<'_>,
+    parameters: &Parameters,
+    shape: &Shape,
+    description: &Description,
+) -> Result<Result<(GenerationShape, u64), PipelineError>, ReindexError> {
+    let key = shape_key(shape, &parameters.learning_fingerprint());
+    let size = match request.store.dictionaries(&key) {
+        Ok(Some((_, size))) => size,
+        _ => match learn_model(&[description], parameters, request.cancel, &|_, _| {}) {
+            Ok(model) => request.store.put_dictionaries(&key, &model.dictionaries)?,
+            Err(PipelineError::Cancelled(_)) => return Err(ReindexError::Cancelled),
+            Err(error) => return Ok(Err(error)),
+        },
+    };
+    let entry = GenerationShape {
+        shape: shape.id,
+        dictionary: key,
+    };
+    Ok(Ok((entry, size)))
+}
+
+/// Makes the new generation current, in the store and in memory. Where it would be the current one over again, that
+/// one stays.
+fn switch(
+    store: &Store,
+    current: Option<Generation>,
+    parameters: Parameters,
+    mut classes: Vec<GenerationClass>,
+    live: &ArcSwap<LiveIndex>,
+) -> Result<Option<u64>, ReindexError> {
+    // Classes that were deleted while they were learnt.
+    let existing = store.list_classes(None, usize::MAX)?;
+    classes.retain(|class| existing.iter().any(|e| e.id == class.class));
+    let served = live.load().generation.as_ref().map(|g| g.number);
+    let same = match &current {
+        Some(current) => {
+            served == Some(current.number) && current.parameters == parameters && current.classes == classes
+        }
+        None => classes.is_empty() && store.parameters()? == parameters,
+    };
+    if same {
+        return Ok(served);
+    }
+    let generation = Generation {
+        number: store.next_generation_number()?,
+        parameters,
+        created_at: Timestamp::now(),
+        classes,
+    };
+    // Loaded before the switch, so that nothing can fail after it.
+    let index = store.load_index(&generation)?;
+    store.put_generation_and_switch(&generation)?;
+    let number = generation.number;
+    live.store(Arc::new(LiveIndex {
+        generation: Some(generation),
+        index,
+    }));
+    Ok(Some(number))
+}

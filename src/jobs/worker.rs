@@ -1,0 +1,155 @@
+//! The worker thread: takes jobs in order, one at a time, and brings each to an end.
+
+use super::failure::{ReindexError, panic_text};
+use super::progress::Progress;
+use super::reindex::{Outcome, Reindex, reindex};
+use super::{Inner, JobError, Running};
+use crate::cancel::Cancel;
+use crate::model::{Job, JobFailure, JobId, JobKind, JobState};
+use jiff::Timestamp;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, PoisonError};
+use tokio::sync::watch;
+
+/// A job that was running at that many crashes is not tried again.
+const MAX_ATTEMPTS: u32 = 3;
+
+/// Puts the jobs a former process left unfinished back into the queue.
+pub(super) fn requeue_interrupted(inner: &Inner) -> Result<(), JobError> {
+    let mut state = inner.state();
+    for mut job in inner.store.unfinished_jobs()? {
+        if job.state == JobState::Processing {
+            if job.attempts >= MAX_ATTEMPTS {
+                job.state = JobState::Failed;
+                job.finished_at = Some(Timestamp::now());
+                job.failure = Some(JobFailure {
+                    code: "crashed_repeatedly".to_owned(),
+                    detail: format!(
+                        "the process ended {} times while working on this job",
+                        job.attempts
+                    ),
+                });
+                inner.store.put_job(&job, true)?;
+                continue;
+            }
+            job.state = JobState::Enqueued;
+            job.steps.clear();
+            inner.store.put_job(&job, true)?;
+        }
+        state.waiting.push_back(job.id);
+        state.channels.insert(job.id, watch::Sender::new(job));
+    }
+    inner.count(&state);
+    Ok(())
+}
+
+/// The thread's body: until it is told to stop.
+pub(super) fn run(inner: &Arc<Inner>) {
+    while let Some((id, channel, cancel)) = next(inner) {
+        let ended =
+            catch_unwind(AssertUnwindSafe(|| work(inner, &channel, &cancel))).unwrap_or_else(|panic| {
+                let text = panic_text(panic.as_ref());
+                tracing::error!(job = %id, text, "a job panicked");
+                Err(ReindexError::failed(
+                    "internal",
+                    format!("a defect in shapelex: {text}"),
+                ))
+            });
+        finish(inner, id, &channel, ended);
+    }
+    let mut state = inner.state();
+    state.stopped = true;
+    inner.changed.notify_all();
+}
+
+/// Waits for the next job and marks it as running; `None` at shutdown.
+fn next(inner: &Inner) -> Option<(JobId, watch::Sender<Job>, Cancel)> {
+    let mut state = inner.state();
+    loop {
+        if state.stopping {
+            return None;
+        }
+        let Some(id) = state.waiting.pop_front() else {
+            state = inner.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+            continue;
+        };
+        let Some(channel) = state.channels.get(&id).cloned() else {
+            continue;
+        };
+        let cancel = Cancel::new();
+        state.running = Some(Running {
+            id,
+            cancel: cancel.clone(),
+            on_request: false,
+        });
+        inner.count(&state);
+        return Some((id, channel, cancel));
+    }
+}
+
+fn work(inner: &Inner, channel: &watch::Sender<Job>, cancel: &Cancel) -> Result<Outcome, ReindexError> {
+    channel.send_modify(|job| {
+        job.state = JobState::Processing;
+        job.started_at = Some(Timestamp::now());
+        job.attempts += 1;
+        job.steps.clear();
+    });
+    let job = channel.borrow().clone();
+    // Durable before the work begins, so that a job that brings the process down is counted.
+    inner.store.put_job(&job, true)?;
+    let JobKind::Reindex { scope, parameters } = &job.kind;
+    let progress = Progress::new(inner.store.clone(), channel.clone());
+    let request = Reindex {
+        store: &inner.store,
+        limits: &inner.options.limits,
+        cancel,
+        progress: &progress,
+        scope,
+        parameters: parameters.as_ref(),
+    };
+    let outcome = inner.pool.install(|| reindex(&request, &inner.live))?;
+    match inner.store.collect_garbage() {
+        Ok(garbage) => tracing::debug!(?garbage, "collected"),
+        Err(error) => tracing::warn!(%error, "garbage was not collected"),
+    }
+    Ok(outcome)
+}
+
+/// Brings a job to its final state, or back into the queue at shutdown.
+fn finish(inner: &Inner, id: JobId, channel: &watch::Sender<Job>, ended: Result<Outcome, ReindexError>) {
+    let mut state = inner.state();
+    let on_request = state.running.take().is_some_and(|running| running.on_request);
+    let mut job = channel.borrow().clone();
+    match ended {
+        Ok(outcome) => {
+            job.state = JobState::Succeeded;
+            job.generation = outcome.generation;
+            job.result = Some(outcome.report);
+        }
+        Err(ReindexError::Cancelled) if state.stopping && !on_request => {
+            job.state = JobState::Enqueued;
+            job.attempts = job.attempts.saturating_sub(1);
+            job.steps.clear();
+        }
+        Err(ReindexError::Cancelled) => job.state = JobState::Canceled,
+        Err(ReindexError::Failed(failure)) => {
+            tracing::warn!(job = %id, code = failure.code, detail = failure.detail, "a job failed");
+            job.state = JobState::Failed;
+            job.failure = Some(failure);
+        }
+    }
+    if job.state.is_finished() {
+        job.finished_at = Some(Timestamp::now());
+        state.channels.remove(&id);
+    }
+    if let Err(error) = inner
+        .store
+        .put_job(&job, true)
+        .and_then(|()| inner.store.forget_old_jobs())
+    {
+        tracing::error!(%error, job = %id, "the end of a job was not written");
+    }
+    channel.send_replace(job);
+    inner.count(&state);
+    inner.changed.notify_all();
+}

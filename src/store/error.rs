@@ -1,0 +1,104 @@
+//! Why the store could not do what it was asked.
+
+use crate::model::{ClassId, ClassName, JobId, ShapeId};
+use std::path::PathBuf;
+
+/// The store's errors. Those up to [`StoreError::NameTaken`] are the caller's; the others are the machine's.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum StoreError {
+    /// There is no such class.
+    #[error("there is no class {id}")]
+    NoClass {
+        /// The identifier asked for.
+        id: ClassId,
+    },
+    /// There is no such shape.
+    #[error("there is no shape {id}")]
+    NoShape {
+        /// The identifier asked for.
+        id: ShapeId,
+    },
+    /// There is no such job.
+    #[error("there is no job {id}")]
+    NoJob {
+        /// The identifier asked for.
+        id: JobId,
+    },
+    /// Another class has this name.
+    #[error("there is a class named '{name}' already, {id}")]
+    NameTaken {
+        /// The name.
+        name: ClassName,
+        /// The class that has it.
+        id: ClassId,
+    },
+    /// The disk is full. Nothing was changed.
+    #[error("the disk is full: {detail}")]
+    Full {
+        /// What was being written.
+        detail: String,
+    },
+    /// An earlier write failed, so nothing more is written. Reading goes on.
+    #[error("the store is read-only since a write failed: {why}")]
+    ReadOnly {
+        /// The failure.
+        why: String,
+    },
+    /// A record or file is not what was written.
+    #[error("{what} is damaged: {detail}")]
+    Damaged {
+        /// Which record or file.
+        what: String,
+        /// What is wrong with it.
+        detail: String,
+    },
+    /// The data directory is of a format this build does not know.
+    #[error("data directory has format {found}, this shapelex reads up to {supported}; {hint}")]
+    NewerFormat {
+        /// The directory's format.
+        found: u32,
+        /// The newest format this build reads.
+        supported: u32,
+        /// What to do.
+        hint: &'static str,
+    },
+    /// Another process uses the data directory.
+    #[error(
+        "another process uses the data directory {path}; stop it, or give this one a directory of its own"
+    )]
+    Locked {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The file system or the key-value store failed.
+    #[error("{what}: {detail}")]
+    Io {
+        /// What was being done.
+        what: String,
+        /// The failure.
+        detail: String,
+    },
+}
+
+impl StoreError {
+    /// Wraps a file system error, telling a full disk apart.
+    pub(crate) fn io(what: impl Into<String>, error: &std::io::Error) -> Self {
+        let what = what.into();
+        match error.kind() {
+            std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
+                Self::Full { detail: what }
+            }
+            _ => Self::Io {
+                what,
+                detail: error.to_string(),
+            },
+        }
+    }
+
+    pub(crate) fn damaged(what: impl Into<String>, detail: impl Into<String>) -> Self {
+        Self::Damaged {
+            what: what.into(),
+            detail: detail.into(),
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! Removing what nothing refers to any more: dictionaries of earlier generations, stored files without a shape, cached
+//! signatures of other parameters, unfinished temporary files.
+
+use super::{Batch, Store, StoreError, files, keys, record};
+use crate::model::{ContentHash, Generation, Shape};
+use crate::parameters::Parameters;
+use std::collections::BTreeSet;
+use std::sync::PoisonError;
+
+/// What a collection removed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Garbage {
+    /// Dictionaries.
+    pub dictionaries: usize,
+    /// Stored files.
+    pub originals: usize,
+    /// Cached signatures.
+    pub signatures: usize,
+}
+
+/// Dictionaries looked at per scan, so that they are never all in memory.
+const CHUNK: usize = 64;
+
+impl Store {
+    /// Removes what neither the catalogue nor the current generation refers to. Only the indexing worker calls this,
+    /// between two jobs, since dictionaries of a generation in the making are referred to by nothing yet.
+    ///
+    /// # Errors
+    /// [`StoreError::ReadOnly`]; a record that cannot be read; a failure of the file system.
+    pub fn collect_garbage(&self) -> Result<Garbage, StoreError> {
+        self.inner.writable()?;
+        let generation = self.generation()?;
+        let mut garbage = Garbage {
+            dictionaries: self.collect_dictionaries(generation.as_ref())?,
+            ..Garbage::default()
+        };
+        let _gate = self.inner.files.write().unwrap_or_else(PoisonError::into_inner);
+        files::walk(&self.inner.path.join("originals"), |path, name| {
+            let kept = match name.parse::<ContentHash>() {
+                Ok(content) => self.is_referenced(content)?,
+                Err(_) => false,
+            };
+            if !kept {
+                files::remove(path)?;
+                garbage.originals += 1;
+            }
+            Ok(())
+        })?;
+        let parameters = match generation {
+            Some(generation) => generation.parameters,
+            None => self.parameters()?,
+        };
+        garbage.signatures = self.collect_signatures(&parameters)?;
+        Ok(garbage)
+    }
+
+    fn collect_dictionaries(&self, generation: Option<&Generation>) -> Result<usize, StoreError> {
+        let kept: BTreeSet<Vec<u8>> = generation
+            .iter()
+            .flat_map(|g| &g.classes)
+            .flat_map(|c| {
+                std::iter::once(&c.dictionary).chain(c.shape_dictionaries.iter().map(|s| &s.dictionary))
+            })
+            .map(|key| keys::dictionary(key))
+            .collect();
+        let mut batch = Batch::default();
+        let mut after: Option<Vec<u8>> = None;
+        loop {
+            let entries = self
+                .inner
+                .backend
+                .scan(keys::DICTIONARY, after.as_deref(), CHUNK)?;
+            let Some((last, _)) = entries.last() else { break };
+            after = Some(last.clone());
+            for (key, _) in entries {
+                if !kept.contains(&key) {
+                    batch.delete(key);
+                }
+            }
+        }
+        if !batch.is_empty() {
+            self.inner.commit(&batch, true)?;
+        }
+        Ok(batch.writes.len())
+    }
+
+    fn collect_signatures(&self, parameters: &Parameters) -> Result<usize, StoreError> {
+        let fingerprint = parameters.description_fingerprint();
+        let mut kept = BTreeSet::new();
+        let mut after: Option<Vec<u8>> = None;
+        loop {
+            let entries = self.inner.backend.scan(keys::SHAPE, after.as_deref(), CHUNK)?;
+            let Some((last, _)) = entries.last() else { break };
+            after = Some(last.clone());
+            for (key, value) in &entries {
+                let shape: Shape = record::unseal(key, value)?;
+                kept.insert(super::signatures::file_name(shape.identity(), &fingerprint));
+            }
+        }
+        let mut removed = 0;
+        files::walk(&self.inner.path.join("signatures"), |path, name| {
+            if !kept.contains(name) {
+                files::remove(path)?;
+                removed += 1;
+            }
+            Ok(())
+        })?;
+        Ok(removed)
+    }
+}

@@ -1,0 +1,79 @@
+//! Jobs, and which of them are not finished.
+
+use super::event::{get, put};
+use super::payload::QueueLink;
+use super::{Batch, Store, StoreError, keys, record};
+use crate::model::{Job, JobId};
+
+/// Finished jobs that are remembered.
+const REMEMBERED: usize = 1000;
+
+impl Store {
+    /// Writes a job. A job that is not finished is in the queue, a finished one is not; both change together.
+    /// Progress need not be `durable`: losing it in a crash loses nothing that was acknowledged.
+    ///
+    /// # Errors
+    /// [`StoreError::ReadOnly`], or the write's failure.
+    pub fn put_job(&self, job: &Job, durable: bool) -> Result<(), StoreError> {
+        let mut batch = Batch::default();
+        put(&mut batch, keys::job(job.id), job)?;
+        if job.state.is_finished() {
+            batch.delete(keys::queue(job.id));
+        } else {
+            put(&mut batch, keys::queue(job.id), &QueueLink::to_job(job.id))?;
+        }
+        self.inner.commit(&batch, durable)
+    }
+
+    /// A job.
+    ///
+    /// # Errors
+    /// [`StoreError::NoJob`]; [`StoreError::Damaged`].
+    pub fn job(&self, id: JobId) -> Result<Job, StoreError> {
+        get(&*self.inner.backend, &keys::job(id))?.ok_or(StoreError::NoJob { id })
+    }
+
+    /// Up to `limit` jobs, newest first, those older than `before` only.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`].
+    pub fn list_jobs(&self, before: Option<JobId>, limit: usize) -> Result<Vec<Job>, StoreError> {
+        let before = before.map(keys::job);
+        self.inner
+            .backend
+            .scan_back(keys::JOB, before.as_deref(), limit)?
+            .iter()
+            .map(|(key, value)| record::unseal(key, value))
+            .collect()
+    }
+
+    /// The jobs that are not finished, oldest first.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`].
+    pub fn unfinished_jobs(&self) -> Result<Vec<Job>, StoreError> {
+        self.inner
+            .backend
+            .scan(keys::QUEUE, None, usize::MAX)?
+            .iter()
+            .map(|(key, value)| self.job(record::unseal::<QueueLink>(key, value)?.job()))
+            .collect()
+    }
+
+    /// Forgets the oldest finished jobs beyond the thousand latest.
+    ///
+    /// # Errors
+    /// [`StoreError::ReadOnly`], or the write's failure.
+    pub fn forget_old_jobs(&self) -> Result<usize, StoreError> {
+        let jobs = self.list_jobs(None, usize::MAX)?;
+        let mut batch = Batch::default();
+        for job in jobs.iter().filter(|j| j.state.is_finished()).skip(REMEMBERED) {
+            batch.delete(keys::job(job.id));
+        }
+        let forgotten = batch.writes.len();
+        if forgotten > 0 {
+            self.inner.commit(&batch, false)?;
+        }
+        Ok(forgotten)
+    }
+}

@@ -1,0 +1,196 @@
+//! The durable store: classes, training shapes with their files, generations of the index, jobs.
+//!
+//! Small records live in an embedded key-value store behind the narrow [`Backend`] trait; uploaded files lie beside
+//! it under the name of their contents; and every change of the catalogue is also a line of an append-only log, from
+//! which the records can be rebuilt. `docs/storage.md` describes the data directory key by key.
+//!
+//! **What is acknowledged is durable**: a method that changes something returns after the disk has confirmed it.
+//! After a failed write the store is read-only ([`Store::health`] says why) until it is opened again, since nobody
+//! knows what a disk holds after a write it refused.
+
+pub mod backend;
+mod catalogue;
+mod catalogue_log;
+mod dictionaries;
+pub mod error;
+mod event;
+mod files;
+mod garbage;
+mod generations;
+mod jobs;
+mod keys;
+pub mod memory_backend;
+mod migrate;
+mod open;
+mod originals;
+mod payload;
+mod payload_jobs;
+mod rebuild;
+pub mod record;
+mod signatures;
+mod sled_backend;
+
+pub use backend::Backend;
+pub use catalogue::AddedShape;
+pub use dictionaries::Dictionaries;
+pub use error::StoreError;
+pub use garbage::Garbage;
+pub use memory_backend::MemoryBackend;
+pub use migrate::FORMAT;
+
+use backend::Batch;
+use catalogue_log::CatalogueLog;
+use event::Event;
+use payload::Number;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock};
+
+/// How a store is opened.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StoreOptions {
+    /// Page cache of the key-value store, in bytes.
+    pub cache_bytes: u64,
+}
+
+impl Default for StoreOptions {
+    /// 64 MiB.
+    fn default() -> Self {
+        Self {
+            cache_bytes: 64 << 20,
+        }
+    }
+}
+
+/// Whether the store takes writes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Health {
+    /// It does.
+    Ready,
+    /// A write failed, so it no longer does.
+    ReadOnly {
+        /// The failure.
+        why: String,
+    },
+}
+
+/// What the store holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    /// Classes.
+    pub classes: u64,
+    /// Training shapes.
+    pub shapes: u64,
+    /// Bytes of the shapes' files; a file several shapes came from counts for each.
+    pub bytes: u64,
+}
+
+/// The durable store. Cheap to clone; every clone is the same store. All methods block on the disk: an asynchronous
+/// caller uses `spawn_blocking`.
+#[derive(Clone)]
+pub struct Store {
+    inner: Arc<Inner>,
+}
+
+struct Inner {
+    path: PathBuf,
+    backend: Arc<dyn Backend>,
+    /// Held while the catalogue is read, changed and written.
+    writer: Mutex<Writer>,
+    /// Held shared while stored files are written and not yet referred to, exclusively while unreferenced ones are
+    /// removed.
+    files: RwLock<()>,
+    /// The first failed write.
+    failure: OnceLock<String>,
+    recovery: Vec<String>,
+    /// Released when the last clone is dropped.
+    _lock: File,
+}
+
+struct Writer {
+    log: CatalogueLog,
+    /// The number of the last event.
+    sequence: u64,
+}
+
+impl Inner {
+    fn writer(&self) -> MutexGuard<'_, Writer> {
+        // A writer that panicked left at most an event in the log that was never acknowledged.
+        self.writer.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn writable(&self) -> Result<(), StoreError> {
+        match self.failure.get() {
+            None => Ok(()),
+            Some(why) => Err(StoreError::ReadOnly { why: why.clone() }),
+        }
+    }
+
+    /// Remembers that a write failed; from now on all are refused.
+    fn fail(&self, error: StoreError) -> StoreError {
+        let why = error.to_string();
+        tracing::error!(%why, "a write failed; the store is read-only now");
+        // Only the first failure is kept.
+        let _ = self.failure.set(why);
+        error
+    }
+
+    /// Applies a batch, and waits for the disk where it must be durable.
+    fn commit(&self, batch: &Batch, durable: bool) -> Result<(), StoreError> {
+        self.writable()?;
+        self.backend.apply(batch).map_err(|e| self.fail(e))?;
+        if durable {
+            self.backend.flush().map_err(|e| self.fail(e))?;
+        }
+        Ok(())
+    }
+
+    /// Makes an event happen: into the log first, then into the records, with more writes of the caller's in the same
+    /// batch.
+    fn record(&self, writer: &mut Writer, event: &Event, more: Batch) -> Result<(), StoreError> {
+        self.writable()?;
+        let sequence = writer.sequence + 1;
+        // Staged before the log knows of it: a record that cannot be read must not leave an event behind.
+        let mut batch = event::stage(&*self.backend, event)?;
+        batch.writes.extend(more.writes);
+        event::put(&mut batch, keys::META_SEQUENCE.to_vec(), &Number(sequence))?;
+        if let Err(append) = writer.log.append(sequence, event) {
+            return Err(if append.in_doubt {
+                self.fail(append.error)
+            } else {
+                append.error
+            });
+        }
+        self.commit(&batch, true)?;
+        writer.sequence = sequence;
+        Ok(())
+    }
+}
+
+impl Store {
+    /// The data directory.
+    pub fn path(&self) -> &Path {
+        &self.inner.path
+    }
+
+    /// Whether the store takes writes; readiness asks.
+    pub fn health(&self) -> Health {
+        match self.inner.failure.get() {
+            None => Health::Ready,
+            Some(why) => Health::ReadOnly { why: why.clone() },
+        }
+    }
+
+    /// What had to be recovered when the store was opened, a sentence each; empty where nothing had to be.
+    pub fn recovery(&self) -> &[String] {
+        &self.inner.recovery
+    }
+
+    /// Waits until everything written so far is on the disk. Methods that change the catalogue have done so already.
+    ///
+    /// # Errors
+    /// [`StoreError::ReadOnly`], or the flush's failure.
+    pub fn flush(&self) -> Result<(), StoreError> {
+        self.inner.commit(&Batch::default(), true)
+    }
+}

@@ -1,0 +1,143 @@
+//! The production backend: sled 0.34, one tree, so that a batch over several record families is atomic.
+
+use super::StoreError;
+use super::backend::{Backend, Batch, Entry, prefix_end};
+use std::ops::Bound;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// The key-value engine in a directory of its own.
+pub struct SledBackend {
+    db: sled::Db,
+}
+
+impl SledBackend {
+    /// Opens or creates the engine's directory.
+    ///
+    /// # Errors
+    /// Whatever keeps sled from opening it. sled can panic on a damaged directory; that is caught and is an error
+    /// like the others.
+    pub fn open(path: &Path, cache_bytes: u64) -> Result<Self, StoreError> {
+        remove_unfinished_snapshots(path)?;
+        // We flush before every acknowledgement ourselves; sled's timer would only add wake-ups of an idle process.
+        let config = sled::Config::new()
+            .path(path)
+            .cache_capacity(cache_bytes)
+            .mode(sled::Mode::LowSpace)
+            .flush_every_ms(None);
+        let db = caught("open the key-value store", || config.open())?;
+        Ok(Self { db })
+    }
+}
+
+/// sled writes a snapshot of its page table to `snap.….generating` and renames it. One left over from an abrupt stop
+/// holds nothing the log does not, and keeps sled from opening where its name is not what sled expects.
+fn remove_unfinished_snapshots(path: &Path) -> Result<(), StoreError> {
+    let entries = match std::fs::read_dir(path) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(StoreError::io("list the key-value store", &error)),
+    };
+    for entry in entries.flatten() {
+        if entry.path().extension().is_some_and(|e| e == "generating") {
+            std::fs::remove_file(entry.path())
+                .map_err(|e| StoreError::io("remove an unfinished snapshot of the key-value store", &e))?;
+        }
+    }
+    Ok(())
+}
+
+fn caught<T>(what: &str, work: impl FnOnce() -> sled::Result<T>) -> Result<T, StoreError> {
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(sled::Error::Io(error))) => Err(StoreError::io(what, &error)),
+        Ok(Err(error @ sled::Error::Corruption { .. })) => {
+            Err(StoreError::damaged("the key-value store", error.to_string()))
+        }
+        Ok(Err(error)) => Err(StoreError::Io {
+            what: what.to_owned(),
+            detail: error.to_string(),
+        }),
+        Err(panic) => Err(StoreError::damaged(
+            "the key-value store",
+            format!("the engine panicked: {}", panic_text(panic.as_ref())),
+        )),
+    }
+}
+
+fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
+    panic
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no message")
+}
+
+impl Backend for SledBackend {
+    fn get(&self, key: &[u8]) -> Result<Option<Vec<u8>>, StoreError> {
+        caught("read a record", || self.db.get(key)).map(|value| value.map(|v| v.to_vec()))
+    }
+
+    fn scan(&self, prefix: &[u8], after: Option<&[u8]>, limit: usize) -> Result<Vec<Entry>, StoreError> {
+        let low = after.filter(|key| *key >= prefix).map_or_else(
+            || Bound::Included(prefix.to_vec()),
+            |key| Bound::Excluded(key.to_vec()),
+        );
+        let high = prefix_end(prefix).map_or(Bound::Unbounded, Bound::Excluded);
+        if let (Bound::Excluded(low), Bound::Excluded(high)) = (&low, &high)
+            && low >= high
+        {
+            return Ok(Vec::new());
+        }
+        caught("scan records", || {
+            self.db
+                .range((low, high))
+                .take(limit)
+                .map(|entry| entry.map(|(k, v)| (k.to_vec(), v.to_vec())))
+                .collect()
+        })
+    }
+
+    fn scan_back(
+        &self,
+        prefix: &[u8],
+        before: Option<&[u8]>,
+        limit: usize,
+    ) -> Result<Vec<Entry>, StoreError> {
+        let end = prefix_end(prefix);
+        let high = match (before, &end) {
+            (Some(key), Some(end)) if key < end.as_slice() => Bound::Excluded(key.to_vec()),
+            (Some(key), None) => Bound::Excluded(key.to_vec()),
+            (_, Some(end)) => Bound::Excluded(end.clone()),
+            (None, None) => Bound::Unbounded,
+        };
+        if let Bound::Excluded(high) = &high
+            && high.as_slice() <= prefix
+        {
+            return Ok(Vec::new());
+        }
+        caught("scan records", || {
+            self.db
+                .range((Bound::Included(prefix.to_vec()), high))
+                .rev()
+                .take(limit)
+                .map(|entry| entry.map(|(k, v)| (k.to_vec(), v.to_vec())))
+                .collect()
+        })
+    }
+
+    fn apply(&self, batch: &Batch) -> Result<(), StoreError> {
+        let mut sled_batch = sled::Batch::default();
+        for (key, value) in &batch.writes {
+            match value {
+                Some(value) => sled_batch.insert(key.as_slice(), value.as_slice()),
+                None => sled_batch.remove(key.as_slice()),
+            }
+        }
+        caught("write records", || self.db.apply_batch(sled_batch))
+    }
+
+    fn flush(&self) -> Result<(), StoreError> {
+        caught("flush the key-value store", || self.db.flush()).map(|_| ())
+    }
+}
