@@ -25,6 +25,8 @@ pub mod signature;
 pub mod spectral;
 
 #[cfg(feature = "service")]
+pub mod http;
+#[cfg(feature = "service")]
 pub mod jobs;
 #[cfg(feature = "service")]
 pub mod model;
