@@ -1,7 +1,6 @@
 //! Simplification to the working size by quadric error (Garland and Heckbert 1997), with meshoptimizer.
 
 use super::clean::{Cleaned, clean_again, drop_unreferenced};
-use super::edges::edge_census;
 use super::orient::orient;
 use super::{Components, MeshError};
 use meshopt::{SimplifyOptions, simplify_decoder, simplify_sloppy_decoder};
@@ -34,20 +33,22 @@ const ANY_ERROR: f32 = 1e3;
 /// in single precision, within the mesh's unit frame. Collapses first keep to the topology, then go across
 /// non-manifold places, and as the last resort vertices are clustered on a grid. Borders are free to move
 /// along themselves. A little regularisation keeps flat regions from being reduced to slivers, on which the
-/// piecewise linear Laplacian is poor. The result is cleaned again.
+/// piecewise linear Laplacian is poor. The result is cleaned again. A mesh whose neighbouring faces do not all run
+/// the same way (not `oriented`) is oriented first.
 ///
 /// Errors: [`MeshError::Degenerate`] when nothing with an area is left.
 pub(super) fn simplify_to(
     mesh: &mut Cleaned,
     working_size: usize,
     keep: Components,
+    oriented: bool,
 ) -> Result<Simplified, MeshError> {
     if working_size == 0 || mesh.vertices.len() <= working_size {
         return Ok(Simplified::No);
     }
     // Fewer than four vertices are not a mesh.
     let size = working_size.max(4);
-    if edge_census(mesh.vertices.len(), &mesh.faces).inconsistent > 0 {
+    if !oriented {
         orient(mesh.vertices.len(), &mut mesh.faces);
     }
     let steps = [
