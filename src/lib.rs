@@ -21,12 +21,21 @@ pub mod mesh;
 pub mod parameters;
 pub mod pipeline;
 pub mod ranking;
+pub mod sample;
 pub mod signature;
 pub mod spectral;
 
+#[cfg(feature = "service")]
+pub mod cli;
+#[cfg(feature = "service")]
+pub mod config;
+#[cfg(feature = "service")]
+pub mod http;
 #[cfg(feature = "service")]
 pub mod jobs;
 #[cfg(feature = "service")]
 pub mod model;
 #[cfg(feature = "service")]
 pub mod store;
+#[cfg(feature = "service")]
+pub mod telemetry;

@@ -1,0 +1,97 @@
+//! The service's settings: plain values, filled by whoever starts it.
+
+use super::archive::ArchiveLimits;
+use super::upload::UploadLimits;
+use crate::jobs::JobOptions;
+use crate::mesh::Limits;
+use crate::parameters::Preset;
+use crate::store::StoreOptions;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Everything the service can be told.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ServiceConfig {
+    /// Where it listens.
+    pub listen: SocketAddr,
+    /// Where it keeps everything.
+    pub data_dir: PathBuf,
+    /// How the store is opened.
+    pub store: StoreOptions,
+    /// Longest request body, in bytes.
+    pub max_body_bytes: usize,
+    /// Files of one upload, or members of its archive, at most.
+    pub max_upload_files: usize,
+    /// Bytes of all members of an archive, unpacked, at most.
+    pub max_unpacked_bytes: usize,
+    /// What reading one mesh may build at most.
+    pub limits: Limits,
+    /// Threads that answer queries and check uploads.
+    pub query_threads: usize,
+    /// Queries that may wait for a thread.
+    pub query_queue: usize,
+    /// How long a query waits for a thread before it is turned away.
+    pub query_wait: Duration,
+    /// How long a query may compute.
+    pub query_timeout: Duration,
+    /// How long a request's body may take to arrive.
+    pub upload_timeout: Duration,
+    /// Threads that learn dictionaries.
+    pub indexing_threads: usize,
+    /// Jobs that may wait.
+    pub job_queue: usize,
+    /// What the first reindex starts from, where it names no preset.
+    pub preset: Preset,
+    /// How long running work may go on when the service is asked to stop.
+    pub shutdown_timeout: Duration,
+}
+
+impl Default for ServiceConfig {
+    /// Loopback port 7878, `./shapelex-data`, bodies up to 128 MiB, 2048 files or 256 MiB unpacked per upload, a query
+    /// thread per core, 64 waiting queries for at most 10 s each, 60 s per query, 120 s per body.
+    fn default() -> Self {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let jobs = JobOptions::default();
+        Self {
+            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 7878)),
+            data_dir: PathBuf::from("shapelex-data"),
+            store: StoreOptions::default(),
+            max_body_bytes: 128 << 20,
+            max_upload_files: 2048,
+            max_unpacked_bytes: 256 << 20,
+            limits: Limits::default(),
+            query_threads: cores,
+            query_queue: 64,
+            query_wait: Duration::from_secs(10),
+            query_timeout: Duration::from_secs(60),
+            upload_timeout: Duration::from_secs(120),
+            indexing_threads: jobs.indexing_threads,
+            job_queue: jobs.queue_limit,
+            preset: Preset::Default,
+            shutdown_timeout: Duration::from_secs(10),
+        }
+    }
+}
+
+impl ServiceConfig {
+    /// What an upload may hold.
+    pub fn upload_limits(&self) -> UploadLimits {
+        UploadLimits {
+            max_body_bytes: self.max_body_bytes,
+            archive: ArchiveLimits {
+                max_members: self.max_upload_files,
+                max_bytes: self.max_unpacked_bytes,
+            },
+        }
+    }
+
+    /// How jobs are run.
+    pub fn job_options(&self) -> JobOptions {
+        JobOptions {
+            indexing_threads: self.indexing_threads,
+            queue_limit: self.job_queue,
+            limits: self.limits,
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! What travels over the wire. Domain types are never serialised to a client: they change with the method, these
+//! change with the API's version. Types that come in refuse fields they do not know.
+
+pub mod class;
+pub mod index;
+pub mod job;
+pub mod parameters;
+pub mod problem;
+pub mod query;
+pub mod shape;
+
+use crate::http::problem::{Code, Problem};
+use base64::Engine;
+use base64::engine::general_purpose::URL_SAFE_NO_PAD;
+use serde::{Deserialize, Serialize};
+use std::str::FromStr;
+use utoipa::{IntoParams, ToSchema};
+
+/// Where a list begins and how long it is.
+#[derive(Clone, Debug, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct PageQuery {
+    /// How many items at most, 1 to 1000; 100 where it is left out.
+    #[param(minimum = 1, maximum = 1000, default = 100)]
+    pub limit: Option<usize>,
+    /// `next_cursor` of the page before; the first page where it is left out.
+    pub cursor: Option<String>,
+}
+
+impl PageQuery {
+    /// The page's length.
+    ///
+    /// # Errors
+    /// `invalid_query` outside 1 to 1000.
+    pub fn limit(&self) -> Result<usize, Problem> {
+        match self.limit.unwrap_or(100) {
+            limit @ 1..=1000 => Ok(limit),
+            other => Err(Problem::new(
+                Code::InvalidQuery,
+                format!("limit must be between 1 and 1000, got {other}"),
+            )
+            .with("name", "limit")),
+        }
+    }
+
+    /// The last item of the page before.
+    ///
+    /// # Errors
+    /// `invalid_cursor` where this service did not make it.
+    pub fn after<Id: FromStr>(&self) -> Result<Option<Id>, Problem> {
+        let Some(cursor) = &self.cursor else {
+            return Ok(None);
+        };
+        URL_SAFE_NO_PAD
+            .decode(cursor)
+            .ok()
+            .and_then(|bytes| String::from_utf8(bytes).ok()?.parse().ok())
+            .map(Some)
+            .ok_or_else(|| {
+                Problem::new(
+                    Code::InvalidCursor,
+                    "the cursor is not one this service made; start again without it",
+                )
+            })
+    }
+}
+
+/// Part of a list.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct Page<T> {
+    /// The items.
+    pub items: Vec<T>,
+    /// Pass it as `cursor` to get the next page; `null` at the end.
+    pub next_cursor: Option<String>,
+}
+
+impl<T> Page<T> {
+    /// Makes a page of up to `limit` items out of up to `limit + 1`: the one too many tells that there are more.
+    pub fn cut<S>(mut found: Vec<S>, limit: usize, id: impl Fn(&S) -> String, to: impl Fn(S) -> T) -> Self {
+        let more = found.len() > limit;
+        found.truncate(limit);
+        let next_cursor = found
+            .last()
+            .filter(|_| more)
+            .map(|last| URL_SAFE_NO_PAD.encode(id(last)));
+        Self {
+            items: found.into_iter().map(to).collect(),
+            next_cursor,
+        }
+    }
+}
+
+/// A file's bytes.
+#[derive(ToSchema)]
+#[schema(value_type = String, format = Binary)]
+pub struct Binary(#[allow(dead_code, reason = "only its schema is used")] Vec<u8>);
+
+/// A multipart form: every part is a file, whatever its name.
+#[derive(ToSchema)]
+#[allow(dead_code, reason = "only its schema is used")]
+pub struct FilesForm {
+    /// The files: meshes, buffers of glTF files, archives.
+    #[schema(value_type = Vec<String>, format = Binary)]
+    pub file: Vec<Vec<u8>>,
+}
+
+/// A timestamp as the wire has it: RFC 3339, UTC.
+pub(crate) fn time(timestamp: jiff::Timestamp) -> String {
+    timestamp.to_string()
+}

@@ -1,0 +1,141 @@
+//! Queries and their answers on the wire.
+
+use super::class::ClassRef;
+use super::parameters::{HypothesisName, ParametersDto, RankByName};
+use super::shape::ReportDto;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use utoipa::{IntoParams, ToSchema};
+
+/// How a query is asked.
+#[derive(Clone, Debug, Default, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct QueryOptions {
+    /// How many classes (and nearest shapes) are answered at most; all where it is left out.
+    #[param(minimum = 1)]
+    pub top: Option<usize>,
+    /// What classes are ordered by; the index's own parameter where it is left out.
+    #[param(inline)]
+    pub rank_by: Option<RankByName>,
+    /// What a raw body is called, such as `dog0.obj`.
+    pub name: Option<String>,
+}
+
+/// How well a class regenerates the query.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct RankedClass {
+    /// 1 is best.
+    pub rank: usize,
+    /// The class.
+    pub class: ClassRef,
+    /// What the ranking is ordered by, ascending.
+    pub score: f64,
+    /// ‖S − DA‖, the paper's Eq. 5.
+    pub reconstruction_error: f64,
+    /// The same over ‖S‖, 0 to about 1.
+    pub relative_error: f64,
+    /// Mean Lasso objective per signature.
+    pub mean_objective: f64,
+    /// Mean of the smallest 80 % of the objectives.
+    pub trimmed_objective: f64,
+    /// Mean number of atoms a signature was built from.
+    pub mean_nonzeros: f64,
+    /// The way of preparing the query the score comes from.
+    pub hypothesis: HypothesisName,
+    /// By how much the next class is worse, relative to it; `null` for the last.
+    pub margin: Option<f64>,
+}
+
+/// How well a single training shape regenerates the query.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct RankedShape {
+    /// 1 is best.
+    pub rank: usize,
+    /// The shape's id.
+    pub shape: String,
+    /// Its class.
+    pub class: ClassRef,
+    /// What the ranking is ordered by, ascending.
+    pub score: f64,
+    /// ‖S − DA‖, the paper's Eq. 5.
+    pub reconstruction_error: f64,
+}
+
+/// The answer to a query.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct QueryAnswer {
+    /// The mesh's name.
+    pub name: String,
+    /// Classes, best first.
+    pub classes: Vec<RankedClass>,
+    /// Training shapes, best first, where the index has dictionaries of single shapes.
+    pub nearest_shapes: Vec<RankedShape>,
+    /// Relative margin of the best class to the runner-up, 0 to 1; 1 where there is only one.
+    pub confidence: f64,
+    /// Classes that were compared with.
+    pub compared: usize,
+    /// Signatures that were coded.
+    pub signatures: usize,
+    /// The mesh's format.
+    pub format: String,
+    /// What preparing did to the mesh.
+    pub mesh: ReportDto,
+    /// Things you should know, one sentence each.
+    pub warnings: Vec<String>,
+    /// The mesh's first eigenvalues.
+    pub eigenvalues: Vec<f64>,
+    /// The generation of the index that answered.
+    pub generation: u64,
+    /// What the classes were ordered by.
+    pub rank_by: RankByName,
+    /// The parameters of the index.
+    pub parameters: ParametersDto,
+    /// Milliseconds by stage: `wait`, `read`, `prepare`, `laplacian`, `eigenpairs`, `signatures`, `ranking` and
+    /// `total`.
+    pub timings_ms: BTreeMap<String, f64>,
+}
+
+/// One line of a batch's answer. The last line has only a summary.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum BatchLine {
+    /// A mesh that was answered.
+    Answered {
+        /// `ok`.
+        status: &'static str,
+        /// Which mesh, from 0, in the order they were sent.
+        index: usize,
+        /// The answer, its members beside these.
+        #[serde(flatten)]
+        answer: Box<QueryAnswer>,
+    },
+    /// A mesh that could not be answered. This is not "no match".
+    Failed {
+        /// `failed`.
+        status: &'static str,
+        /// Which mesh, from 0, in the order they were sent.
+        index: usize,
+        /// Its name.
+        name: String,
+        /// Why.
+        #[schema(value_type = super::problem::ProblemDocument)]
+        problem: serde_json::Value,
+    },
+    /// The last line. A stream that ends without it was cut short.
+    Summary {
+        /// How it went.
+        summary: BatchSummary,
+    },
+}
+
+/// How a batch went.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ToSchema)]
+pub struct BatchSummary {
+    /// Meshes in the batch.
+    pub total: usize,
+    /// Meshes that were answered.
+    pub ok: usize,
+    /// Meshes that could not be answered.
+    pub failed: usize,
+}

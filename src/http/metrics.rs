@@ -1,0 +1,148 @@
+//! What the service counts and times, in the Prometheus text format.
+//!
+//! Every series exists from the start, at zero, and labels come from closed lists only: operations of the route table,
+//! stages of the pipeline, failure codes.
+
+use super::problem::Code;
+use super::state::AppState;
+use crate::pipeline::Stage;
+use ::metrics::{counter, describe_counter, describe_gauge, describe_histogram, gauge, histogram};
+use metrics_exporter_prometheus::{PrometheusBuilder, PrometheusHandle};
+use std::sync::OnceLock;
+use std::time::Duration;
+
+/// Upper bounds of the histograms' buckets, in seconds.
+const BUCKETS: &[f64] = &[
+    0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0,
+];
+
+const REQUESTS: &str = "shapelex_http_requests_total";
+const REQUEST_SECONDS: &str = "shapelex_http_request_seconds";
+const PROBLEMS: &str = "shapelex_problems_total";
+const STAGE_SECONDS: &str = "shapelex_stage_seconds";
+const WAIT_SECONDS: &str = "shapelex_compute_wait_seconds";
+const PANICS: &str = "shapelex_panics_total";
+
+static RECORDER: OnceLock<PrometheusHandle> = OnceLock::new();
+
+/// The process's recorder; the first call installs it.
+pub fn install() -> &'static PrometheusHandle {
+    RECORDER.get_or_init(|| {
+        // Buckets are a constant, so setting them fails for no value.
+        let builder = PrometheusBuilder::new()
+            .set_buckets(BUCKETS)
+            .unwrap_or_else(|_| PrometheusBuilder::new());
+        let recorder = builder.build_recorder();
+        let handle = recorder.handle();
+        if ::metrics::set_global_recorder(recorder).is_err() {
+            tracing::warn!("another metrics recorder is installed; /metrics stays empty");
+        }
+        describe();
+        zero();
+        handle
+    })
+}
+
+fn describe() {
+    describe_counter!(REQUESTS, "Requests answered, by operation and class of status");
+    describe_histogram!(REQUEST_SECONDS, "Seconds until the answer began, by operation");
+    describe_counter!(PROBLEMS, "Problems answered, by code");
+    describe_histogram!(STAGE_SECONDS, "Seconds of a query's stages");
+    describe_histogram!(WAIT_SECONDS, "Seconds a piece of work waited for a thread");
+    describe_counter!(PANICS, "Panics that were caught");
+    describe_gauge!(
+        "shapelex_compute_running",
+        "Pieces of work being done by the query threads"
+    );
+    describe_gauge!(
+        "shapelex_compute_waiting",
+        "Pieces of work waiting for a query thread"
+    );
+    describe_gauge!("shapelex_jobs_pending", "Jobs waiting or being worked on");
+    describe_gauge!("shapelex_classes", "Classes in the catalogue");
+    describe_gauge!("shapelex_shapes", "Training shapes in the catalogue");
+    describe_gauge!("shapelex_original_bytes", "Bytes of the training shapes' files");
+    describe_gauge!(
+        "shapelex_index_generation",
+        "Generation of the index; 0 before the first"
+    );
+    describe_gauge!("shapelex_index_classes", "Classes with a dictionary");
+    describe_gauge!("shapelex_ready", "1 where the service is ready");
+}
+
+fn zero() {
+    for operation in super::openapi::operation_ids().chain(["unmatched".to_owned()]) {
+        for status in ["2xx", "3xx", "4xx", "5xx"] {
+            counter!(REQUESTS, "operation" => operation.clone(), "status" => status).increment(0);
+        }
+        let _ = histogram!(REQUEST_SECONDS, "operation" => operation);
+    }
+    for code in Code::ALL {
+        counter!(PROBLEMS, "code" => code.name()).increment(0);
+    }
+    for stage in STAGES {
+        let _ = histogram!(STAGE_SECONDS, "stage" => stage.name());
+    }
+    let _ = histogram!(WAIT_SECONDS);
+    counter!(PANICS).increment(0);
+}
+
+const STAGES: [Stage; 6] = [
+    Stage::Read,
+    Stage::Prepare,
+    Stage::Laplacian,
+    Stage::Eigenpairs,
+    Stage::Signatures,
+    Stage::Ranking,
+];
+
+/// A request was answered.
+pub fn count_request(operation: &str, status: u16, took: Duration) {
+    let class = match status {
+        0..=299 => "2xx",
+        300..=399 => "3xx",
+        400..=499 => "4xx",
+        _ => "5xx",
+    };
+    counter!(REQUESTS, "operation" => operation.to_owned(), "status" => class).increment(1);
+    histogram!(REQUEST_SECONDS, "operation" => operation.to_owned()).record(took.as_secs_f64());
+}
+
+/// A problem was answered, also as a line of a batch.
+pub fn count_problem(code: Code) {
+    counter!(PROBLEMS, "code" => code.name()).increment(1);
+}
+
+/// A stage of a query ended.
+pub fn time_stage(stage: Stage, took: Duration) {
+    histogram!(STAGE_SECONDS, "stage" => stage.name()).record(took.as_secs_f64());
+}
+
+/// A piece of work got its place.
+pub fn time_wait(took: Duration) {
+    histogram!(WAIT_SECONDS).record(took.as_secs_f64());
+}
+
+/// A panic was caught.
+pub fn count_panic() {
+    counter!(PANICS).increment(1);
+}
+
+/// Everything, as Prometheus reads it. Gauges are read off the service now.
+pub fn render(state: &AppState) -> String {
+    let handle = install();
+    let live = state.jobs.live_index();
+    gauge!("shapelex_compute_running").set(state.compute.running() as f64);
+    gauge!("shapelex_compute_waiting").set(state.compute.waiting() as f64);
+    gauge!("shapelex_jobs_pending").set(state.jobs.queue_depth() as f64);
+    gauge!("shapelex_index_generation").set(live.generation.as_ref().map_or(0, |g| g.number) as f64);
+    gauge!("shapelex_index_classes").set(live.index.classes.len() as f64);
+    gauge!("shapelex_ready").set(f64::from(u8::from(state.readiness().is_ready())));
+    if let Ok(statistics) = state.store.statistics() {
+        gauge!("shapelex_classes").set(statistics.classes as f64);
+        gauge!("shapelex_shapes").set(statistics.shapes as f64);
+        gauge!("shapelex_original_bytes").set(statistics.bytes as f64);
+    }
+    handle.run_upkeep();
+    handle.render()
+}

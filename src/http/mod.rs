@@ -1,0 +1,26 @@
+//! The HTTP service: requests → jobs, store, pipeline, and nothing computed here.
+//!
+//! [`router::router`] has every route on one screen; a handler's name is its operation's id in `openapi.yaml`, which
+//! [`openapi`] makes out of the handlers. Every answer that is not a success is a [`problem::Problem`].
+
+pub mod admission;
+pub mod answer;
+pub mod archive;
+pub mod config;
+pub mod dto;
+pub mod extract;
+pub mod metrics;
+pub mod openapi;
+pub mod problem;
+mod problem_from;
+pub mod respond;
+pub mod router;
+mod routes;
+pub mod serve;
+pub mod state;
+pub mod upload;
+
+pub use config::ServiceConfig;
+pub use router::router;
+pub use serve::serve;
+pub use state::{AppState, OpenError};

@@ -1,0 +1,176 @@
+//! The one place where errors of the layers below become problems.
+
+use super::problem::{Code, Problem};
+use crate::coding::CodingError;
+use crate::jobs::JobError;
+use crate::mesh::MeshError;
+use crate::model::ClassNameError;
+use crate::parameters::ParameterError;
+use crate::pipeline::PipelineError;
+use crate::ranking::RankingError;
+use crate::spectral::SpectralError;
+use crate::store::StoreError;
+
+impl From<MeshError> for Problem {
+    fn from(error: MeshError) -> Self {
+        let detail = error.to_string();
+        let of = |code| Self::new(code, detail.clone());
+        match error {
+            MeshError::Empty => of(Code::EmptyBody),
+            MeshError::UnknownFormat => of(Code::UnknownFormat),
+            MeshError::Malformed { format, .. } => of(Code::MalformedMesh).with("format", format.to_string()),
+            MeshError::Truncated { format, .. } => of(Code::TruncatedMesh).with("format", format.to_string()),
+            MeshError::Unsupported { format, feature } => of(Code::UnsupportedFeature)
+                .with("format", format.to_string())
+                .with("feature", feature),
+            MeshError::MissingBuffer { uri } => of(Code::MissingBuffer).with("uri", uri),
+            MeshError::IndexOutOfRange {
+                face,
+                index,
+                vertices,
+            } => of(Code::IndexOutOfRange)
+                .with("face", face)
+                .with("index", index)
+                .with("vertices", vertices),
+            MeshError::NotFinite { vertex } => of(Code::NotFinite).with("vertex", vertex),
+            MeshError::NoFaces { vertices } => of(Code::NoFaces).with("vertices", vertices),
+            MeshError::TooSmall { vertices, faces } => of(Code::MeshTooSmall)
+                .with("vertices", vertices)
+                .with("faces", faces),
+            MeshError::Degenerate => of(Code::DegenerateMesh),
+            MeshError::TooLarge { what, found, limit } => of(Code::MeshTooLarge)
+                .with("what", what)
+                .with("found", found)
+                .with("limit", limit),
+            MeshError::NoAnimation => of(Code::NoAnimation),
+            MeshError::Invalid { .. } => of(Code::InvalidMesh),
+        }
+    }
+}
+
+impl From<SpectralError> for Problem {
+    fn from(error: SpectralError) -> Self {
+        let detail = error.to_string();
+        match error {
+            SpectralError::Cancelled(_) => Self::new(Code::Cancelled, detail),
+            SpectralError::TooFewEigenpairs { found, needed } => Self::new(Code::SpectrumFailed, detail)
+                .with("found", found)
+                .with("needed", needed),
+            SpectralError::Factorisation { .. } | SpectralError::NotConverged { .. } => {
+                Self::new(Code::SpectrumFailed, detail)
+            }
+        }
+    }
+}
+
+impl From<CodingError> for Problem {
+    fn from(error: CodingError) -> Self {
+        let detail = error.to_string();
+        match error {
+            CodingError::Cancelled(_) => Self::new(Code::Cancelled, detail),
+            other => Self::new(Code::CodingFailed, detail).logged(format!("{other:?}")),
+        }
+    }
+}
+
+impl From<RankingError> for Problem {
+    fn from(error: RankingError) -> Self {
+        let detail = error.to_string();
+        match error {
+            RankingError::Coding(inner) => inner.into(),
+            RankingError::EmptyIndex => index_empty(),
+            RankingError::NoPlainView => Self::internal(detail),
+            RankingError::MissingChannel { class, .. } => {
+                Self::new(Code::IndexIncomplete, detail).with("class", class)
+            }
+        }
+    }
+}
+
+impl From<ParameterError> for Problem {
+    fn from(error: ParameterError) -> Self {
+        Self::new(Code::InvalidParameter, error.to_string())
+            .with("name", error.name)
+            .with("expected", error.expected)
+            .with("found", error.found)
+    }
+}
+
+impl From<PipelineError> for Problem {
+    fn from(error: PipelineError) -> Self {
+        match error {
+            PipelineError::Cancelled(c) => Self::new(Code::Cancelled, c.to_string()),
+            PipelineError::Mesh(e) => e.into(),
+            PipelineError::Spectral(e) => e.into(),
+            PipelineError::Coding(e) => e.into(),
+            PipelineError::Ranking(e) => e.into(),
+            PipelineError::Parameter(e) => e.into(),
+        }
+    }
+}
+
+/// No class has a dictionary: says what to do next.
+pub fn index_empty() -> Problem {
+    Problem::new(
+        Code::IndexEmpty,
+        "no class has a dictionary yet; upload shapes to a class, then POST /v1/reindex and wait for its job",
+    )
+    .with("next", "/v1/reindex")
+}
+
+impl From<StoreError> for Problem {
+    fn from(error: StoreError) -> Self {
+        let detail = error.to_string();
+        match error {
+            StoreError::NoClass { .. } => Self::new(Code::ClassNotFound, detail),
+            StoreError::NoShape { .. } => Self::new(Code::ShapeNotFound, detail),
+            StoreError::NoJob { .. } => Self::new(Code::JobNotFound, detail),
+            StoreError::NameTaken { name, id } => Self::new(Code::ClassExists, detail)
+                .with("name", name.to_string())
+                .with("class", id.to_string()),
+            StoreError::Full { .. } => Self::new(
+                Code::StorageFull,
+                "the disk is full; nothing was changed. Free some space and try again",
+            )
+            .logged(detail),
+            StoreError::ReadOnly { .. } => Self::new(
+                Code::StoreUnavailable,
+                "the store takes no writes since one failed; /readyz and the log say why",
+            )
+            .with("retry_after_seconds", 30)
+            .logged(detail),
+            StoreError::Damaged { .. } => Self::new(
+                Code::Internal,
+                "a stored record is damaged; the log has it under this request id",
+            )
+            .logged(detail),
+            // Paths and system errors are the operator's business, not the client's.
+            other => Self::internal(other),
+        }
+    }
+}
+
+impl From<JobError> for Problem {
+    fn from(error: JobError) -> Self {
+        let detail = error.to_string();
+        match error {
+            JobError::QueueFull { limit } => Self::new(Code::QueueFull, detail)
+                .with("limit", limit)
+                .with("retry_after_seconds", 10),
+            JobError::NoJob { .. } => Self::new(Code::JobNotFound, detail),
+            JobError::Finished { state, .. } => {
+                Self::new(Code::JobFinished, detail).with("state", state.name())
+            }
+            JobError::Parameter(e) => e.into(),
+            JobError::ShuttingDown => Self::new(Code::ShuttingDown, detail),
+            JobError::Store(e) => e.into(),
+            JobError::NoWorker { .. } => Self::internal(detail),
+        }
+    }
+}
+
+impl From<ClassNameError> for Problem {
+    fn from(error: ClassNameError) -> Self {
+        Self::new(Code::InvalidName, error.to_string())
+    }
+}

@@ -1,0 +1,141 @@
+//! What happens around every handler: a request id, a span, metrics, and a problem document for whatever failed.
+
+use super::metrics;
+use super::problem::{Code, Problem};
+use super::state::AppState;
+use axum::extract::{MatchedPath, Request, State};
+use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use std::time::Instant;
+use tracing::Instrument;
+
+/// The header a request id comes in by and goes out by.
+pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+
+#[derive(Clone)]
+struct RequestId(String);
+
+/// The id of a request that went through [`around`], for answers that carry problems inside.
+pub fn id_of(request: &Request) -> Option<String> {
+    request.extensions().get::<RequestId>().map(|id| id.0.clone())
+}
+
+/// The outermost layer.
+pub async fn around(State(state): State<AppState>, mut request: Request, next: Next) -> Response {
+    let id = request_id(&request);
+    request.extensions_mut().insert(RequestId(id.clone()));
+    let operation = operation(&request);
+    let method = request.method().clone();
+    let path = request.uri().path().to_owned();
+    let span = tracing::info_span!("request", request_id = %id, operation, %method, path);
+    let began = Instant::now();
+    let response = next.run(request).instrument(span.clone()).await;
+    let took = began.elapsed();
+    let mut response = span.in_scope(|| finish(response, &id));
+    let status = response.status();
+    metrics::count_request(operation, status.as_u16(), took);
+    let milliseconds = took.as_secs_f64() * 1e3;
+    span.in_scope(|| {
+        if is_probe(operation) {
+            tracing::debug!(status = status.as_u16(), milliseconds, "answered");
+        } else {
+            tracing::info!(status = status.as_u16(), milliseconds, "answered");
+        }
+    });
+    let headers = response.headers_mut();
+    // Only visible ASCII gets through `request_id`, so the value is always a header value.
+    if let Ok(value) = HeaderValue::from_str(&id) {
+        headers.insert(REQUEST_ID, value);
+    }
+    headers.insert(
+        header::X_CONTENT_TYPE_OPTIONS,
+        HeaderValue::from_static("nosniff"),
+    );
+    if state.stopping.is_cancelled() {
+        headers.insert(header::CONNECTION, HeaderValue::from_static("close"));
+    }
+    response
+}
+
+/// A handler panicked.
+pub fn panicked(panic: Box<dyn std::any::Any + Send + 'static>) -> Response {
+    metrics::count_panic();
+    Problem::internal(super::admission::panic_message(&*panic)).into_response()
+}
+
+/// No route matches.
+pub async fn route_not_found(request: Request) -> Problem {
+    Problem::new(
+        Code::RouteNotFound,
+        format!(
+            "there is nothing at {}; /docs lists what there is",
+            request.uri().path()
+        ),
+    )
+}
+
+/// Turns whatever failed into a problem document with the request's id.
+fn finish(mut response: Response, id: &str) -> Response {
+    let status = response.status();
+    if !status.is_client_error() && !status.is_server_error() {
+        return response;
+    }
+    let problem = response
+        .extensions_mut()
+        .remove::<Problem>()
+        .unwrap_or_else(|| from_status(status));
+    metrics::count_problem(problem.code);
+    match &problem.internal {
+        Some(internal) => tracing::error!(code = problem.code.name(), internal, "{}", problem.detail),
+        None => tracing::info!(code = problem.code.name(), "{}", problem.detail),
+    }
+    let mut rendered = problem.to_response(Some(id));
+    // What a method fallback says about the methods there are.
+    if let Some(allow) = response.headers_mut().remove(header::ALLOW) {
+        rendered.headers_mut().insert(header::ALLOW, allow);
+    }
+    rendered
+}
+
+/// A problem for a failure that axum or a layer answered by itself.
+fn from_status(status: StatusCode) -> Problem {
+    let code = match status {
+        StatusCode::NOT_FOUND => Code::RouteNotFound,
+        StatusCode::METHOD_NOT_ALLOWED => Code::MethodNotAllowed,
+        StatusCode::REQUEST_TIMEOUT => Code::RequestTimeout,
+        StatusCode::PAYLOAD_TOO_LARGE => Code::BodyTooLarge,
+        StatusCode::UNSUPPORTED_MEDIA_TYPE => Code::UnsupportedMediaType,
+        StatusCode::SERVICE_UNAVAILABLE => Code::Overloaded,
+        StatusCode::GATEWAY_TIMEOUT => Code::DeadlineExceeded,
+        other if other.is_client_error() => Code::InvalidRequest,
+        _ => Code::Internal,
+    };
+    Problem::new(code, code.title())
+}
+
+/// The id the client sent, where it is 1 to 128 visible ASCII characters, or a new one.
+fn request_id(request: &Request) -> String {
+    request
+        .headers()
+        .get(REQUEST_ID)
+        .and_then(|v| v.to_str().ok())
+        .filter(|v| (1..=128).contains(&v.len()) && v.bytes().all(|b| b.is_ascii_graphic()))
+        .map_or_else(|| uuid::Uuid::now_v7().to_string(), str::to_owned)
+}
+
+fn operation(request: &Request) -> &'static str {
+    let method = match *request.method() {
+        Method::HEAD => &Method::GET,
+        ref other => other,
+    };
+    request
+        .extensions()
+        .get::<MatchedPath>()
+        .and_then(|path| super::openapi::operation_id(method, path.as_str()))
+        .unwrap_or("unmatched")
+}
+
+fn is_probe(operation: &str) -> bool {
+    matches!(operation, "get_liveness" | "get_readiness" | "get_metrics")
+}

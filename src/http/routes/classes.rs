@@ -1,0 +1,193 @@
+//! Classes: made, listed, shown, renamed, deleted.
+
+use crate::http::AppState;
+use crate::http::dto::class::{ClassDto, CreateClass, RenameClass};
+use crate::http::dto::{Page, PageQuery};
+use crate::http::extract::{ApiJson, ApiPath, ApiQuery};
+use crate::http::problem::{Code, Problem};
+use crate::model::{Class, ClassId, ClassName};
+use crate::store::{Store, StoreError};
+use axum::Json;
+use axum::extract::State;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use std::sync::PoisonError;
+
+/// Make a class
+///
+/// Its name must not be taken. Shapes can be uploaded to it at once; queries find it after a reindex.
+#[utoipa::path(
+    post, path = "/v1/classes", tag = "classes",
+    request_body = CreateClass,
+    responses((status = 201, description = "The class", body = ClassDto, headers(
+        ("location" = String, description = "Where the class is"),
+        ("etag" = String, description = "For `if-match`"),
+    )))
+)]
+pub async fn create_class(
+    State(state): State<AppState>,
+    ApiJson(body): ApiJson<CreateClass>,
+) -> Result<Response, Problem> {
+    let name = ClassName::new(&body.name)?;
+    let class = state.blocking(move |s| Ok(s.store.create_class(name)?)).await?;
+    let location = format!("/v1/classes/{}", class.id);
+    let mut response = answer(&state, StatusCode::CREATED, class);
+    insert(&mut response, header::LOCATION, &location);
+    Ok(response)
+}
+
+/// List classes
+///
+/// In the order they were made.
+#[utoipa::path(
+    get, path = "/v1/classes", tag = "classes", params(PageQuery),
+    responses((status = 200, description = "A page of classes", body = Page<ClassDto>))
+)]
+pub async fn list_classes(
+    State(state): State<AppState>,
+    ApiQuery(page): ApiQuery<PageQuery>,
+) -> Result<Json<Page<ClassDto>>, Problem> {
+    let (limit, after) = (page.limit()?, page.after::<ClassId>()?);
+    let found = state
+        .blocking(move |s| Ok(s.store.list_classes(after, limit + 1)?))
+        .await?;
+    let live = state.jobs.live_index();
+    Ok(Json(Page::cut(
+        found,
+        limit,
+        |class| class.id.to_string(),
+        |class| ClassDto::new(class, live.generation.as_ref()),
+    )))
+}
+
+/// Show a class
+#[utoipa::path(
+    get, path = "/v1/classes/{class}", tag = "classes",
+    params(("class" = String, Path, description = "Its id or its name", example = "dog")),
+    responses((status = 200, description = "The class", body = ClassDto, headers(
+        ("etag" = String, description = "For `if-match`"),
+    )))
+)]
+pub async fn get_class(
+    State(state): State<AppState>,
+    ApiPath(class): ApiPath<String>,
+) -> Result<Response, Problem> {
+    let class = state.blocking(move |s| find_class(&s.store, &class)).await?;
+    Ok(answer(&state, StatusCode::OK, class))
+}
+
+/// Rename a class
+///
+/// Its id, its shapes and its dictionary stay; queries answer with the new name at once.
+#[utoipa::path(
+    patch, path = "/v1/classes/{class}", tag = "classes",
+    params(
+        ("class" = String, Path, description = "Its id or its name", example = "dog"),
+        ("if-match" = Option<String>, Header, description = "Only where the class still has this `etag`"),
+    ),
+    request_body = RenameClass,
+    responses((status = 200, description = "The class", body = ClassDto, headers(
+        ("etag" = String, description = "For `if-match`"),
+    )))
+)]
+pub async fn rename_class(
+    State(state): State<AppState>,
+    ApiPath(class): ApiPath<String>,
+    headers: HeaderMap,
+    ApiJson(body): ApiJson<RenameClass>,
+) -> Result<Response, Problem> {
+    let name = ClassName::new(&body.name)?;
+    let class = state
+        .blocking(move |s| {
+            let _alone = s.catalogue.lock().unwrap_or_else(PoisonError::into_inner);
+            let class = find_class(&s.store, &class)?;
+            check_match(&headers, &class)?;
+            Ok(s.store.rename_class(class.id, name)?)
+        })
+        .await?;
+    Ok(answer(&state, StatusCode::OK, class))
+}
+
+/// Delete a class
+///
+/// With its shapes and their files. Queries do not find it any more at once.
+#[utoipa::path(
+    delete, path = "/v1/classes/{class}", tag = "classes",
+    params(
+        ("class" = String, Path, description = "Its id or its name", example = "dog"),
+        ("if-match" = Option<String>, Header, description = "Only where the class still has this `etag`"),
+    ),
+    responses((status = 204, description = "It is gone"))
+)]
+pub async fn delete_class(
+    State(state): State<AppState>,
+    ApiPath(class): ApiPath<String>,
+    headers: HeaderMap,
+) -> Result<StatusCode, Problem> {
+    state
+        .blocking(move |s| {
+            let _alone = s.catalogue.lock().unwrap_or_else(PoisonError::into_inner);
+            let class = find_class(&s.store, &class)?;
+            check_match(&headers, &class)?;
+            s.store.delete_class(class.id)?;
+            Ok(StatusCode::NO_CONTENT)
+        })
+        .await
+}
+
+/// The class of this id or, where there is none, of this name.
+pub(super) fn find_class(store: &Store, text: &str) -> Result<Class, Problem> {
+    if let Ok(id) = text.parse::<ClassId>() {
+        match store.class(id) {
+            Err(StoreError::NoClass { .. }) => {}
+            found => return Ok(found?),
+        }
+    }
+    let found = match ClassName::new(text) {
+        Ok(name) => store.class_by_name(&name)?,
+        Err(_) => None,
+    };
+    found.ok_or_else(|| {
+        let shown: String = text.chars().take(100).collect();
+        Problem::new(Code::ClassNotFound, format!("there is no class '{shown}'")).with("class", shown)
+    })
+}
+
+fn answer(state: &AppState, status: StatusCode, class: Class) -> Response {
+    let tag = etag(&class);
+    let live = state.jobs.live_index();
+    let body = ClassDto::new(class, live.generation.as_ref());
+    let mut response = (status, Json(body)).into_response();
+    insert(&mut response, header::ETAG, &tag);
+    response
+}
+
+fn etag(class: &Class) -> String {
+    format!("\"{}-{}\"", class.revision, class.updated_at.as_microsecond())
+}
+
+fn check_match(headers: &HeaderMap, class: &Class) -> Result<(), Problem> {
+    let Some(wanted) = headers.get(header::IF_MATCH) else {
+        return Ok(());
+    };
+    let tag = etag(class);
+    let matches = wanted
+        .to_str()
+        .is_ok_and(|list| list.split(',').any(|one| one.trim() == "*" || one.trim() == tag));
+    if matches {
+        Ok(())
+    } else {
+        Err(Problem::new(
+            Code::RevisionMismatch,
+            "the class has changed since it was read; read it again",
+        )
+        .with("etag", tag))
+    }
+}
+
+pub(super) fn insert(response: &mut Response, name: HeaderName, value: &str) {
+    // Ids, tags and escaped names are visible ASCII, so the value is always a header value.
+    if let Ok(value) = HeaderValue::from_str(value) {
+        response.headers_mut().insert(name, value);
+    }
+}

@@ -1,0 +1,94 @@
+//! What an operator's probes ask.
+
+use crate::http::AppState;
+use crate::http::metrics;
+use crate::http::problem::{Code, Problem};
+use axum::Json;
+use axum::extract::State;
+use axum::http::header;
+use axum::response::IntoResponse;
+use serde::Serialize;
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+use utoipa::ToSchema;
+
+/// That the process answers.
+#[derive(Serialize, ToSchema)]
+pub struct Liveness {
+    /// `ok`.
+    pub status: &'static str,
+    /// The service's version.
+    pub version: &'static str,
+}
+
+/// That the service can work.
+#[derive(Serialize, ToSchema)]
+pub struct Ready {
+    /// `ready`.
+    pub status: &'static str,
+    /// Every part that was looked at, `ok` each.
+    pub checks: BTreeMap<&'static str, &'static str>,
+}
+
+/// Is the process alive?
+#[utoipa::path(
+    get, path = "/healthz", tag = "operation",
+    responses((status = 200, description = "It is", body = Liveness))
+)]
+pub async fn get_liveness() -> Json<Liveness> {
+    Json(Liveness {
+        status: "ok",
+        version: env!("CARGO_PKG_VERSION"),
+    })
+}
+
+/// Is the service ready?
+///
+/// The problem names every part that is not, under `checks`.
+#[utoipa::path(
+    get, path = "/readyz", tag = "operation",
+    responses((status = 200, description = "It is", body = Ready))
+)]
+pub async fn get_readiness(State(state): State<AppState>) -> Result<Json<Ready>, Problem> {
+    let readiness = state.readiness();
+    if readiness.is_ready() {
+        let checks = readiness
+            .checks
+            .into_iter()
+            .map(|(part, _)| (part, "ok"))
+            .collect();
+        return Ok(Json(Ready {
+            status: "ready",
+            checks,
+        }));
+    }
+    let wrong: Vec<&str> = readiness
+        .checks
+        .iter()
+        .filter(|(_, w)| w.is_some())
+        .map(|(part, _)| *part)
+        .collect();
+    let detail = format!("not ready: {}", wrong.join(", "));
+    let checks: Map<String, Value> = readiness
+        .checks
+        .into_iter()
+        .map(|(part, wrong)| (part.to_owned(), wrong.unwrap_or_else(|| "ok".to_owned()).into()))
+        .collect();
+    Err(Problem::new(Code::NotReady, detail).with("checks", checks))
+}
+
+/// Show the metrics
+///
+/// In the Prometheus text format.
+#[utoipa::path(
+    get, path = "/metrics", tag = "operation",
+    responses((status = 200, description = "All series", body = String, content_type = "text/plain"))
+)]
+pub async fn get_metrics(State(state): State<AppState>) -> Result<impl IntoResponse, Problem> {
+    let shared = state.clone();
+    let text = state.blocking(move |_| Ok(metrics::render(&shared))).await?;
+    Ok((
+        [(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")],
+        text,
+    ))
+}

@@ -1,0 +1,188 @@
+//! Background work: asked for, listed, shown, cancelled, followed.
+
+use super::classes::{find_class, insert};
+use crate::http::AppState;
+use crate::http::dto::job::{JobDto, ScopeDto, StartReindex};
+use crate::http::dto::{Page, PageQuery};
+use crate::http::extract::{ApiPath, ApiQuery, OptionalJson};
+use crate::http::problem::{Code, Problem};
+use crate::http::state::Parts;
+use crate::model::{Job, JobId, JobKind, ReindexScope};
+use crate::parameters::Parameters;
+use axum::Json;
+use axum::extract::State;
+use axum::http::{StatusCode, header};
+use axum::response::sse::{Event, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use futures_util::{Stream, StreamExt, stream};
+use std::convert::Infallible;
+use tokio_stream::wrappers::WatchStream;
+
+/// Start a reindex
+///
+/// Learns the dictionaries of classes in the background and then switches to a new generation of the index at once.
+/// Queries go on against the old one meanwhile. The answer is a job to follow.
+#[utoipa::path(
+    post, path = "/v1/reindex", tag = "jobs",
+    request_body(content = StartReindex, description = "May be left out"),
+    responses((status = 202, description = "The job", body = JobDto, headers(
+        ("location" = String, description = "Where the job is"),
+    )))
+)]
+pub async fn start_reindex(
+    State(state): State<AppState>,
+    OptionalJson(body): OptionalJson<StartReindex>,
+) -> Result<Response, Problem> {
+    let job = state
+        .blocking(move |s| {
+            let kind = JobKind::Reindex {
+                parameters: parameters(s, &body)?,
+                scope: scope(s, body.scope)?,
+            };
+            Ok(s.jobs.enqueue(kind)?)
+        })
+        .await?;
+    let location = format!("/v1/jobs/{}", job.id);
+    let mut response = (StatusCode::ACCEPTED, Json(JobDto::from(job))).into_response();
+    insert(&mut response, header::LOCATION, &location);
+    Ok(response)
+}
+
+/// `None` where nothing was asked for and there is an index whose parameters can stay.
+fn parameters(parts: &Parts, body: &StartReindex) -> Result<Option<Parameters>, Problem> {
+    let first = parts.jobs.live_index().generation.is_none();
+    let asked = body.preset.is_some() || body.parameters.is_some();
+    if !asked && !first {
+        return Ok(None);
+    }
+    let base = match body.preset {
+        Some(preset) => Parameters::preset(preset.into()),
+        None if first => Parameters::preset(parts.config.preset),
+        None => parts.store.parameters()?,
+    };
+    let parameters = body.parameters.clone().unwrap_or_default().apply(base);
+    parameters.validate()?;
+    Ok(Some(parameters))
+}
+
+fn scope(parts: &Parts, scope: ScopeDto) -> Result<ReindexScope, Problem> {
+    Ok(match scope {
+        ScopeDto::Stale => ReindexScope::Stale,
+        ScopeDto::All => ReindexScope::All,
+        ScopeDto::Classes(classes) if classes.is_empty() => {
+            return Err(Problem::new(
+                Code::InvalidField,
+                "scope.classes names no class; name some, or use \"all\" or \"stale\"",
+            )
+            .with("name", "scope"));
+        }
+        ScopeDto::Classes(classes) => {
+            let mut ids = Vec::with_capacity(classes.len());
+            for class in classes {
+                let id = find_class(&parts.store, &class)?.id;
+                if !ids.contains(&id) {
+                    ids.push(id);
+                }
+            }
+            ReindexScope::Classes(ids)
+        }
+    })
+}
+
+/// List jobs
+///
+/// The latest first.
+#[utoipa::path(
+    get, path = "/v1/jobs", tag = "jobs", params(PageQuery),
+    responses((status = 200, description = "A page of jobs", body = Page<JobDto>))
+)]
+pub async fn list_jobs(
+    State(state): State<AppState>,
+    ApiQuery(page): ApiQuery<PageQuery>,
+) -> Result<Json<Page<JobDto>>, Problem> {
+    let (limit, before) = (page.limit()?, page.after::<JobId>()?);
+    let found = state
+        .blocking(move |s| Ok(s.jobs.list(before, limit + 1)?))
+        .await?;
+    Ok(Json(Page::cut(
+        found,
+        limit,
+        |job| job.id.to_string(),
+        Into::into,
+    )))
+}
+
+/// Show a job
+#[utoipa::path(
+    get, path = "/v1/jobs/{job}", tag = "jobs",
+    params(("job" = String, Path, description = "The job's id")),
+    responses((status = 200, description = "The job", body = JobDto))
+)]
+pub async fn get_job(
+    State(state): State<AppState>,
+    ApiPath(job): ApiPath<String>,
+) -> Result<Json<JobDto>, Problem> {
+    let id = job_id(&job)?;
+    let job = state.blocking(move |s| Ok(s.jobs.job(id)?)).await?;
+    Ok(Json(job.into()))
+}
+
+/// Cancel a job
+///
+/// A waiting job ends at once, a running one at its next look; the index stays as it is.
+#[utoipa::path(
+    post, path = "/v1/jobs/{job}/cancel", tag = "jobs",
+    params(("job" = String, Path, description = "The job's id")),
+    responses((status = 200, description = "The job, which may still be stopping", body = JobDto))
+)]
+pub async fn cancel_job(
+    State(state): State<AppState>,
+    ApiPath(job): ApiPath<String>,
+) -> Result<Json<JobDto>, Problem> {
+    let id = job_id(&job)?;
+    let job = state.blocking(move |s| Ok(s.jobs.cancel(id)?)).await?;
+    Ok(Json(job.into()))
+}
+
+/// Follow a job
+///
+/// As server-sent events: an event `progress` with the job as JSON whenever it changes. The stream ends after the
+/// event with the final state.
+#[utoipa::path(
+    get, path = "/v1/jobs/{job}/events", tag = "jobs",
+    params(("job" = String, Path, description = "The job's id")),
+    responses((status = 200, description = "Events", body = String, content_type = "text/event-stream"))
+)]
+pub async fn follow_job(
+    State(state): State<AppState>,
+    ApiPath(job): ApiPath<String>,
+) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Problem> {
+    let id = job_id(&job)?;
+    let changes = state.blocking(move |s| Ok(s.jobs.subscribe(id)?)).await?;
+    let stopping = state.stopping.clone();
+    let events = until_finished(WatchStream::new(changes))
+        .map(|job| {
+            let event = Event::default().event("progress").id(job.id.to_string());
+            let body = serde_json::to_string(&JobDto::from(job)).unwrap_or_default();
+            Ok(event.data(body))
+        })
+        .take_until(stopping.cancelled_owned());
+    Ok(Sse::new(events).keep_alive(KeepAlive::default()))
+}
+
+/// The changes of a job up to and with its final state.
+fn until_finished(changes: WatchStream<Job>) -> impl Stream<Item = Job> {
+    stream::unfold(Some(changes), |changes| async move {
+        let mut changes = changes?;
+        let job = changes.next().await?;
+        let rest = (!job.state.is_finished()).then_some(changes);
+        Some((job, rest))
+    })
+}
+
+fn job_id(text: &str) -> Result<JobId, Problem> {
+    text.parse().map_err(|_| {
+        let shown: String = text.chars().take(100).collect();
+        Problem::new(Code::JobNotFound, format!("there is no job '{shown}'")).with("job", shown)
+    })
+}

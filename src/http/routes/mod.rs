@@ -1,0 +1,9 @@
+//! The handlers, a file per resource. Each is named verb_resource, which is its operation's id too.
+
+pub mod classes;
+pub mod docs;
+pub mod health;
+pub mod index;
+pub mod jobs;
+pub mod query;
+pub mod shapes;

@@ -1,0 +1,401 @@
+//! Training shapes: uploaded, listed, shown, deleted, downloaded.
+
+use super::classes::{find_class, insert};
+use crate::http::AppState;
+use crate::http::admission::Patience;
+use crate::http::dto::class::ClassDto;
+use crate::http::dto::shape::{ShapeDto, UploadQuery, UploadResult};
+use crate::http::dto::{Binary, FilesForm, Page, PageQuery};
+use crate::http::extract::{ApiPath, ApiQuery};
+use crate::http::problem::{Code, Problem};
+use crate::http::state::Parts;
+use crate::http::upload::{self, UploadedMesh};
+use crate::mesh::{Limits, PrepareOptions, prepare};
+use crate::model::{Class, ClassName, NewShape, Shape, ShapeId, ShapePose};
+use crate::store::{AddedShape, StoreError};
+use axum::Json;
+use axum::body::Body;
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use futures_util::{StreamExt, stream};
+use serde_json::Value;
+use std::sync::{Arc, PoisonError};
+
+/// Upload shapes
+///
+/// One mesh as the body, or several as `multipart/form-data`, or a zip, tar or tar.gz of them. Formats are OBJ, glTF,
+/// GLB, PLY, STL and OFF, told by their bytes first. The buffers of a glTF come along in the same request. Every file
+/// is read and prepared before anything is stored: where one cannot be used, nothing is stored and `failures` names
+/// each. The same bytes again are the same shape.
+#[utoipa::path(
+    post, path = "/v1/classes/{class}/shapes", tag = "shapes",
+    params(
+        ("class" = String, Path, description = "The class's id or name", example = "dog"),
+        UploadQuery,
+    ),
+    request_body(description = "One mesh, several, or an archive of them", content(
+        (Binary = "application/octet-stream"),
+        (Binary = "model/obj"),
+        (Binary = "model/gltf+json"),
+        (Binary = "model/gltf-binary"),
+        (Binary = "model/stl"),
+        (Binary = "application/zip"),
+        (Binary = "application/x-tar"),
+        (Binary = "application/gzip"),
+        (FilesForm = "multipart/form-data"),
+    )),
+    responses(
+        (status = 201, description = "At least one shape was added", body = UploadResult),
+        (status = 200, description = "All shapes were there already", body = UploadResult),
+    )
+)]
+pub async fn create_shapes(
+    State(state): State<AppState>,
+    ApiPath(class): ApiPath<String>,
+    ApiQuery(query): ApiQuery<UploadQuery>,
+    request: Request,
+) -> Result<Response, Problem> {
+    let create = query.create.unwrap_or(false);
+    check_poses(query.poses, &state.config.limits)?;
+    let wanted = class.clone();
+    let options = state
+        .blocking(move |s| {
+            if create {
+                ClassName::new(&wanted)?;
+            } else {
+                find_class(&s.store, &wanted)?;
+            }
+            Ok(s.store.parameters()?.prepare_options())
+        })
+        .await?;
+    let upload = upload::receive(
+        request,
+        query.name,
+        state.config.upload_limits(),
+        state.config.upload_timeout,
+    )
+    .await?;
+    let shapes = check_all(&state, upload.meshes, query.poses, options).await?;
+    let (class, added) = state.blocking(move |s| store(s, &class, create, shapes)).await?;
+    let status = if added.iter().any(|a| a.created) {
+        StatusCode::CREATED
+    } else {
+        StatusCode::OK
+    };
+    let live = state.jobs.live_index();
+    let body = UploadResult {
+        class: ClassDto::new(class, live.generation.as_ref()),
+        shapes: added.into_iter().map(Into::into).collect(),
+        ignored: upload.ignored,
+    };
+    Ok((status, Json(body)).into_response())
+}
+
+fn check_poses(poses: Option<usize>, limits: &Limits) -> Result<(), Problem> {
+    match poses {
+        Some(poses) if !(1..=limits.max_poses).contains(&poses) => Err(Problem::new(
+            Code::InvalidQuery,
+            format!("poses must be between 1 and {}, got {poses}", limits.max_poses),
+        )
+        .with("name", "poses")),
+        _ => Ok(()),
+    }
+}
+
+/// Reads and prepares every mesh, as many at a time as there are query threads, each in a query's turn.
+async fn check_all(
+    state: &AppState,
+    meshes: Vec<UploadedMesh>,
+    poses: Option<usize>,
+    options: PrepareOptions,
+) -> Result<Vec<NewShape>, Problem> {
+    let total = meshes.len();
+    let limits = state.config.limits;
+    let names: Arc<Vec<String>> = Arc::new(meshes.iter().map(|m| m.name.clone()).collect());
+    // The first one queues like any request and may be turned away; the others follow it in.
+    let outcomes: Vec<Result<Vec<NewShape>, Problem>> = stream::iter(meshes.into_iter().enumerate())
+        .map(|(i, mesh)| {
+            let patience = if i == 0 {
+                Patience::Bounded
+            } else {
+                Patience::Batch
+            };
+            state
+                .compute
+                .run(patience, state.config.query_timeout, move |work| {
+                    check_one(&mesh, poses, &limits, &options, &work.cancel)
+                })
+        })
+        .buffered(state.config.query_threads.max(1))
+        .collect()
+        .await;
+    let mut shapes = Vec::new();
+    let mut failures = Vec::new();
+    for (outcome, name) in outcomes.into_iter().zip(names.iter()) {
+        match outcome {
+            Ok(found) => shapes.extend(found),
+            // A full house or a fault is about the service, not about the file.
+            Err(problem) if problem.code.status().is_server_error() => return Err(problem),
+            Err(problem) => failures.push((name.clone(), problem)),
+        }
+    }
+    if failures.is_empty() {
+        return Ok(shapes);
+    }
+    if total == 1 {
+        return Err(failures.remove(0).1);
+    }
+    let failed = failures.len();
+    let list: Vec<Value> = failures
+        .into_iter()
+        .map(|(name, problem)| {
+            let mut entry = problem.to_json(None);
+            entry["name"] = name.into();
+            entry
+        })
+        .collect();
+    Err(Problem::new(
+        Code::UploadRejected,
+        format!("{failed} of {total} files could not be used; nothing was stored"),
+    )
+    .with("failed", failed)
+    .with("total", total)
+    .with("failures", list))
+}
+
+fn check_one(
+    mesh: &UploadedMesh,
+    poses: Option<usize>,
+    limits: &Limits,
+    options: &PrepareOptions,
+    cancel: &crate::cancel::Cancel,
+) -> Result<Vec<NewShape>, Problem> {
+    let shape = |format, pose, soup| -> Result<NewShape, Problem> {
+        let stopped = |c: crate::cancel::Cancelled| Problem::new(Code::Cancelled, c.to_string());
+        cancel.check().map_err(stopped)?;
+        let (_, report) = prepare(soup, options)?;
+        Ok(NewShape {
+            name: Some(mesh.name.clone()),
+            bytes: mesh.bytes.clone(),
+            companions: mesh.companions(),
+            format,
+            pose,
+            report,
+        })
+    };
+    let Some(wanted) = poses else {
+        let (format, soup) = mesh.read(limits)?;
+        return Ok(vec![shape(format, None, soup)?]);
+    };
+    let (format, found) = mesh.read_poses(wanted, limits)?;
+    let of = found.len();
+    found
+        .into_iter()
+        .enumerate()
+        .map(|(index, pose)| {
+            let label = ShapePose {
+                label: pose.label,
+                index,
+                of,
+            };
+            shape(format, Some(label), pose.soup)
+        })
+        .collect()
+}
+
+fn store(
+    parts: &Parts,
+    class: &str,
+    create: bool,
+    shapes: Vec<NewShape>,
+) -> Result<(Class, Vec<AddedShape>), Problem> {
+    let _alone = parts.catalogue.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut made = None;
+    let found = match find_class(&parts.store, class) {
+        Err(problem) if create && problem.code == Code::ClassNotFound => {
+            let class = parts.store.create_class(ClassName::new(class)?)?;
+            made = Some(class.id);
+            class
+        }
+        found => found?,
+    };
+    match parts.store.add_shapes(found.id, shapes) {
+        Ok(added) => Ok((parts.store.class(found.id)?, added)),
+        Err(error) => {
+            if let Some(id) = made {
+                // Nothing may stay of a refused upload; where this fails too, the store is read-only and says so.
+                let _ = parts.store.delete_class(id);
+            }
+            Err(error.into())
+        }
+    }
+}
+
+/// List shapes
+///
+/// In the order they were added.
+#[utoipa::path(
+    get, path = "/v1/classes/{class}/shapes", tag = "shapes",
+    params(
+        ("class" = String, Path, description = "The class's id or name", example = "dog"),
+        PageQuery,
+    ),
+    responses((status = 200, description = "A page of shapes", body = Page<ShapeDto>))
+)]
+pub async fn list_shapes(
+    State(state): State<AppState>,
+    ApiPath(class): ApiPath<String>,
+    ApiQuery(page): ApiQuery<PageQuery>,
+) -> Result<Json<Page<ShapeDto>>, Problem> {
+    let (limit, after) = (page.limit()?, page.after::<ShapeId>()?);
+    let found = state
+        .blocking(move |s| {
+            let class = find_class(&s.store, &class)?;
+            Ok(s.store.list_shapes(class.id, after, limit + 1)?)
+        })
+        .await?;
+    Ok(Json(Page::cut(found, limit, |s| s.id.to_string(), Into::into)))
+}
+
+/// Show a shape
+#[utoipa::path(
+    get, path = "/v1/classes/{class}/shapes/{shape}", tag = "shapes",
+    params(
+        ("class" = String, Path, description = "The class's id or name", example = "dog"),
+        ("shape" = String, Path, description = "The shape's id"),
+    ),
+    responses((status = 200, description = "The shape", body = ShapeDto))
+)]
+pub async fn get_shape(
+    State(state): State<AppState>,
+    ApiPath((class, shape)): ApiPath<(String, String)>,
+) -> Result<Json<ShapeDto>, Problem> {
+    let shape = state.blocking(move |s| find_shape(s, &class, &shape)).await?;
+    Ok(Json(shape.into()))
+}
+
+/// Delete a shape
+///
+/// Its class is stale afterwards. Its file goes too, unless another shape came from it.
+#[utoipa::path(
+    delete, path = "/v1/classes/{class}/shapes/{shape}", tag = "shapes",
+    params(
+        ("class" = String, Path, description = "The class's id or name", example = "dog"),
+        ("shape" = String, Path, description = "The shape's id"),
+    ),
+    responses((status = 204, description = "It is gone"))
+)]
+pub async fn delete_shape(
+    State(state): State<AppState>,
+    ApiPath((class, shape)): ApiPath<(String, String)>,
+) -> Result<StatusCode, Problem> {
+    state
+        .blocking(move |s| {
+            let _alone = s.catalogue.lock().unwrap_or_else(PoisonError::into_inner);
+            let shape = find_shape(s, &class, &shape)?;
+            s.store.delete_shape(shape.id)?;
+            Ok(StatusCode::NO_CONTENT)
+        })
+        .await
+}
+
+/// Download a shape's file
+///
+/// As it was uploaded, byte for byte. With `if-none-match` and the file's tag the answer is 304.
+#[utoipa::path(
+    get, path = "/v1/classes/{class}/shapes/{shape}/original", tag = "shapes",
+    params(
+        ("class" = String, Path, description = "The class's id or name", example = "dog"),
+        ("shape" = String, Path, description = "The shape's id"),
+        ("if-none-match" = Option<String>, Header, description = "The `etag` of a copy at hand"),
+    ),
+    responses(
+        (status = 200, description = "The file", headers(
+            ("etag" = String, description = "The hash of its bytes"),
+            ("content-disposition" = String, description = "Its name"),
+        ), content(
+            (Binary = "model/obj"),
+            (Binary = "model/gltf+json"),
+            (Binary = "model/gltf-binary"),
+            (Binary = "model/stl"),
+            (Binary = "model/ply"),
+            (Binary = "model/off"),
+        )),
+        (status = 304, description = "The copy at hand is the file"),
+    )
+)]
+pub async fn get_original(
+    State(state): State<AppState>,
+    ApiPath((class, shape)): ApiPath<(String, String)>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let (shape, path) = state
+        .blocking(move |s| {
+            let shape = find_shape(s, &class, &shape)?;
+            let path = s.store.original_path(shape.content);
+            Ok((shape, path))
+        })
+        .await?;
+    let tag = format!("\"{}\"", shape.content);
+    let at_hand = headers
+        .get(header::IF_NONE_MATCH)
+        .and_then(|v| v.to_str().ok())
+        .is_some_and(|list| {
+            list.split(',')
+                .map(|one| one.trim().trim_start_matches("W/"))
+                .any(|one| one == "*" || one == tag)
+        });
+    let mut response = if at_hand {
+        StatusCode::NOT_MODIFIED.into_response()
+    } else {
+        let missing = |e: std::io::Error| {
+            Problem::new(Code::OriginalMissing, "the shape's stored file cannot be read").logged(e)
+        };
+        let file = tokio::fs::File::open(path).await.map_err(missing)?;
+        let length = file.metadata().await.map_err(missing)?.len();
+        let body = Body::from_stream(tokio_util::io::ReaderStream::with_capacity(file, 64 << 10));
+        let mut response = body.into_response();
+        insert(&mut response, header::CONTENT_LENGTH, &length.to_string());
+        insert(&mut response, header::CONTENT_TYPE, shape.format.media_type());
+        insert(&mut response, header::CONTENT_DISPOSITION, &disposition(&shape));
+        response
+    };
+    insert(&mut response, header::ETAG, &tag);
+    insert(&mut response, header::CACHE_CONTROL, "private, no-cache");
+    Ok(response)
+}
+
+/// `attachment` with the file's name, percent-encoded as RFC 8187 has it, so that every name is one header value.
+fn disposition(shape: &Shape) -> String {
+    let fallback = format!("{}.{}", shape.id, shape.format.extension());
+    let name = shape.name.as_deref().unwrap_or(&fallback);
+    let name = name.rsplit('/').next().unwrap_or(name);
+    let mut encoded = String::new();
+    for byte in name.bytes() {
+        if byte.is_ascii_alphanumeric() || b"-._~".contains(&byte) {
+            encoded.push(char::from(byte));
+        } else {
+            encoded.push_str(&format!("%{byte:02X}"));
+        }
+    }
+    format!("attachment; filename*=UTF-8''{encoded}")
+}
+
+fn find_shape(parts: &Parts, class: &str, shape: &str) -> Result<Shape, Problem> {
+    let class = find_class(&parts.store, class)?;
+    let missing = || {
+        let shown: String = shape.chars().take(100).collect();
+        Problem::new(
+            Code::ShapeNotFound,
+            format!("there is no shape '{shown}' in class '{}'", class.name),
+        )
+        .with("shape", shown)
+    };
+    let id: ShapeId = shape.parse().map_err(|_| missing())?;
+    match parts.store.shape(id) {
+        Ok(found) if found.class == class.id => Ok(found),
+        Ok(_) | Err(StoreError::NoShape { .. }) => Err(missing()),
+        Err(other) => Err(other.into()),
+    }
+}

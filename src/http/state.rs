@@ -1,0 +1,142 @@
+//! What every handler shares.
+
+use super::admission::{Compute, ComputeOptions};
+use super::config::ServiceConfig;
+use super::problem::Problem;
+use super::{metrics, openapi};
+use crate::jobs::{JobError, Jobs};
+use crate::store::{Health, Store, StoreError};
+use std::ops::Deref;
+use std::sync::{Arc, Mutex};
+use tokio_util::sync::CancellationToken;
+
+/// Why the service did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// The data directory could not be used.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The job queue could not be started.
+    #[error(transparent)]
+    Jobs(#[from] JobError),
+    /// The system gives no threads.
+    #[error("the query threads could not be started: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    /// The API's document could not be written.
+    #[error("the OpenAPI document could not be written: {0}")]
+    Document(String),
+}
+
+/// The service's parts. Cheap to clone; every clone is the same service.
+#[derive(Clone)]
+pub struct AppState(Arc<Parts>);
+
+/// See [`AppState`].
+pub struct Parts {
+    /// The settings.
+    pub config: ServiceConfig,
+    /// Classes, shapes, generations.
+    pub store: Store,
+    /// The job queue and the live index.
+    pub jobs: Jobs,
+    /// Where requests compute.
+    pub compute: Compute,
+    /// Held while a request reads the catalogue and then changes it by what it read.
+    pub catalogue: Mutex<()>,
+    /// Set when the service is asked to stop; open streams end then.
+    pub stopping: CancellationToken,
+    /// `openapi.yaml`.
+    pub document_yaml: String,
+    /// The same as JSON.
+    pub document_json: String,
+}
+
+impl Deref for AppState {
+    type Target = Parts;
+
+    fn deref(&self) -> &Parts {
+        &self.0
+    }
+}
+
+/// What the service needs to answer, and whether it has it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Readiness {
+    /// Part → `None` where it is well, or what is wrong.
+    pub checks: Vec<(&'static str, Option<String>)>,
+}
+
+impl Readiness {
+    /// Whether everything is well.
+    pub fn is_ready(&self) -> bool {
+        self.checks.iter().all(|(_, wrong)| wrong.is_none())
+    }
+}
+
+impl AppState {
+    /// Opens the data directory and starts the worker. Blocks on the disk.
+    ///
+    /// # Errors
+    /// [`OpenError`] where any part could not be started.
+    pub fn open(config: ServiceConfig) -> Result<Self, OpenError> {
+        metrics::install();
+        let document = |e: &dyn std::fmt::Display| OpenError::Document(e.to_string());
+        let document_yaml = openapi::document_yaml().map_err(|e| document(&e))?;
+        let document_json = openapi::document_json().map_err(|e| document(&e))?;
+        let store = Store::open(&config.data_dir, &config.store)?;
+        for line in store.recovery() {
+            tracing::warn!(recovered = line, "the data directory was repaired");
+        }
+        let jobs = Jobs::start(store.clone(), config.job_options())?;
+        let compute = Compute::new(ComputeOptions {
+            threads: config.query_threads,
+            queue: config.query_queue,
+            wait: config.query_wait,
+        })?;
+        Ok(Self(Arc::new(Parts {
+            config,
+            store,
+            jobs,
+            compute,
+            catalogue: Mutex::new(()),
+            stopping: CancellationToken::new(),
+            document_yaml,
+            document_json,
+        })))
+    }
+
+    /// Runs something that waits for the disk, off tokio's threads.
+    ///
+    /// # Errors
+    /// Its own, and `internal` where it panicked.
+    pub async fn blocking<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Parts) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let state = self.clone();
+        let span = tracing::Span::current();
+        match tokio::task::spawn_blocking(move || span.in_scope(|| work(&state))).await {
+            Ok(result) => result,
+            Err(error) => {
+                metrics::count_panic();
+                Err(Problem::internal(error))
+            }
+        }
+    }
+
+    /// Whether the service can answer.
+    pub fn readiness(&self) -> Readiness {
+        let store = match self.store.health() {
+            Health::Ready => None,
+            Health::ReadOnly { why } => Some(format!("read-only since a write failed: {why}")),
+        };
+        let worker = (!self.jobs.is_running()).then(|| "the indexing worker is not running".to_owned());
+        let stopping = self
+            .stopping
+            .is_cancelled()
+            .then(|| "the service is shutting down".to_owned());
+        Readiness {
+            checks: vec![("store", store), ("worker", worker), ("lifecycle", stopping)],
+        }
+    }
+}

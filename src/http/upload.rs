@@ -1,0 +1,435 @@
+//! A request's body → the meshes in it, whichever way they were sent: raw, multipart, or an archive of them.
+
+use super::archive::{self, ArchiveKind, ArchiveLimits};
+use super::problem::{Code, Problem};
+use crate::mesh::{Companion, Format, Limits, MeshError, Pose, Source, TriangleSoup};
+use axum::extract::{FromRequest, Multipart, Request};
+use axum::http::{HeaderMap, header};
+use bytes::{Bytes, BytesMut};
+use futures_util::StreamExt;
+use serde::Deserialize;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// What an upload may hold at most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UploadLimits {
+    /// Bytes of the whole body.
+    pub max_body_bytes: usize,
+    /// Members of an archive and their bytes; a multipart body has no more parts than that either.
+    pub archive: ArchiveLimits,
+}
+
+/// A mesh file that was sent, with the buffers that came along.
+#[derive(Clone, Debug)]
+pub struct UploadedMesh {
+    /// Its name, or `mesh` where it was sent without one.
+    pub name: String,
+    /// The declared media type, where it names a mesh format.
+    pub media_type: Option<String>,
+    /// Its contents.
+    pub bytes: Bytes,
+    buffers: Arc<Vec<Part>>,
+}
+
+impl UploadedMesh {
+    /// Reads it as one mesh.
+    pub fn read(&self, limits: &Limits) -> Result<(Format, TriangleSoup), MeshError> {
+        let companions = self.companions();
+        crate::mesh::read(&self.source(&companions), limits)
+    }
+
+    /// Samples poses of an animated glTF.
+    pub fn read_poses(&self, poses: usize, limits: &Limits) -> Result<(Format, Vec<Pose>), MeshError> {
+        let companions = self.companions();
+        crate::mesh::read_poses(&self.source(&companions), poses, limits)
+    }
+
+    /// The file as the readers want it.
+    pub fn source<'a>(&'a self, companions: &'a [Companion]) -> Source<'a> {
+        Source {
+            bytes: &self.bytes,
+            name: Some(&self.name),
+            media_type: self.media_type.as_deref(),
+            companions,
+        }
+    }
+
+    /// The buffers a glTF refers to, under the names it calls them by. Copied on demand, so that a thousand meshes
+    /// beside one large buffer do not hold a thousand copies.
+    pub fn companions(&self) -> Vec<Companion> {
+        let is_json = self.bytes.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{');
+        if !is_json || self.buffers.is_empty() {
+            return Vec::new();
+        }
+        // A document that does not parse gets no buffers here and its own error from the reader.
+        let document: GltfBuffers = serde_json::from_slice(&self.bytes).unwrap_or_default();
+        let folder = self.name.rsplit_once('/').map_or("", |(folder, _)| folder);
+        let mut companions: Vec<Companion> = Vec::new();
+        for uri in document.buffers.into_iter().filter_map(|buffer| buffer.uri) {
+            if uri.starts_with("data:") || companions.iter().any(|c| c.name == uri) {
+                continue;
+            }
+            if let Some(part) = self.buffer(folder, &uri) {
+                companions.push(Companion {
+                    name: uri,
+                    bytes: part.bytes.to_vec(),
+                });
+            }
+        }
+        companions
+    }
+
+    /// The buffer a URI means: relative to the mesh's own folder or, since browsers send names without folders, by
+    /// its last part alone.
+    fn buffer(&self, folder: &str, uri: &str) -> Option<&Part> {
+        let uri = percent_decoded(uri);
+        let uri = uri.trim_start_matches("./");
+        let path = match folder {
+            "" => uri.to_owned(),
+            _ => format!("{folder}/{uri}"),
+        };
+        let last = uri.rsplit('/').next().unwrap_or(uri);
+        let exact = self.buffers.iter().find(|part| part.name == path);
+        exact.or_else(|| self.buffers.iter().find(|part| !part.packed && part.name == last))
+    }
+}
+
+/// The part of a glTF document that names other files.
+#[derive(Default, Deserialize)]
+struct GltfBuffers {
+    #[serde(default)]
+    buffers: Vec<GltfBuffer>,
+}
+
+#[derive(Deserialize)]
+struct GltfBuffer {
+    uri: Option<String>,
+}
+
+fn percent_decoded(text: &str) -> String {
+    let digit = |byte: Option<&u8>| byte.and_then(|b| char::from(*b).to_digit(16));
+    let bytes = text.as_bytes();
+    let mut decoded = Vec::with_capacity(bytes.len());
+    let mut i = 0;
+    while i < bytes.len() {
+        match (bytes[i], digit(bytes.get(i + 1)), digit(bytes.get(i + 2))) {
+            (b'%', Some(high), Some(low)) => {
+                decoded.push((high * 16 + low) as u8);
+                i += 3;
+            }
+            (byte, ..) => {
+                decoded.push(byte);
+                i += 1;
+            }
+        }
+    }
+    String::from_utf8_lossy(&decoded).into_owned()
+}
+
+/// Everything a request brought.
+#[derive(Clone, Debug)]
+pub struct Upload {
+    /// The meshes, in the order they were sent.
+    pub meshes: Vec<UploadedMesh>,
+    /// Files that are no meshes and no buffers: materials, textures, notes.
+    pub ignored: Vec<String>,
+}
+
+#[derive(Clone, Debug)]
+struct Part {
+    name: String,
+    media_type: Option<String>,
+    bytes: Bytes,
+    /// Whether it came out of an archive, where files that are no meshes are nothing unusual.
+    packed: bool,
+}
+
+/// Receives a request's body. `name` is what the client calls a raw body.
+///
+/// # Errors
+/// `body_too_large`, `request_timeout`, `unsupported_media_type`, `empty_body`, `invalid_multipart`, `no_files`, and those of
+/// [`archive::unpack`].
+pub async fn receive(
+    request: Request,
+    name: Option<String>,
+    limits: UploadLimits,
+    time_limit: Duration,
+) -> Result<Upload, Problem> {
+    check_length(request.headers(), limits.max_body_bytes)?;
+    let declared = media_type(request.headers());
+    let receiving = async {
+        if declared.as_deref() == Some("multipart/form-data") {
+            receive_multipart(request, &limits).await
+        } else {
+            Ok(vec![receive_raw(request, declared, name, &limits).await?])
+        }
+    };
+    let parts = tokio::time::timeout(time_limit, receiving).await.map_err(|_| {
+        let seconds = time_limit.as_secs_f64();
+        Problem::new(
+            Code::RequestTimeout,
+            format!("the body did not arrive within {seconds:.1} s"),
+        )
+        .with("limit_seconds", seconds)
+    })??;
+    // Unpacking is neither quick nor numeric: off tokio's threads, but not in a query's way either.
+    tokio::task::spawn_blocking(move || sort(parts, &limits))
+        .await
+        .map_err(Problem::internal)?
+}
+
+/// The single mesh of an upload.
+///
+/// # Errors
+/// `one_mesh_expected`.
+pub fn only_mesh(upload: Upload) -> Result<UploadedMesh, Problem> {
+    let found = upload.meshes.len();
+    let mut meshes = upload.meshes.into_iter();
+    match (meshes.next(), meshes.next()) {
+        (Some(mesh), None) => Ok(mesh),
+        _ => Err(Problem::new(
+            Code::OneMeshExpected,
+            format!("{found} meshes were sent; send one, or use POST /v1/query/batch"),
+        )
+        .with("found", found)),
+    }
+}
+
+/// The problem of a body longer than the limit.
+pub fn body_too_large(limit: usize) -> Problem {
+    Problem::new(
+        Code::BodyTooLarge,
+        format!("the body is longer than {limit} bytes"),
+    )
+    .with("limit_bytes", limit)
+}
+
+fn check_length(headers: &HeaderMap, limit: usize) -> Result<(), Problem> {
+    let declared = headers
+        .get(header::CONTENT_LENGTH)
+        .and_then(|v| v.to_str().ok()?.parse::<u64>().ok());
+    match declared {
+        Some(length) if length > limit as u64 => Err(body_too_large(limit).with("body_bytes", length)),
+        _ => Ok(()),
+    }
+}
+
+fn media_type(headers: &HeaderMap) -> Option<String> {
+    let value = headers.get(header::CONTENT_TYPE)?.to_str().ok()?;
+    Some(
+        value
+            .split(';')
+            .next()
+            .unwrap_or_default()
+            .trim()
+            .to_ascii_lowercase(),
+    )
+}
+
+/// Media types of a raw body. curl stamps `application/x-www-form-urlencoded` on every `--data-binary` that names no
+/// type, so it says as little as `application/octet-stream`.
+fn is_readable(media_type: &str) -> bool {
+    media_type.starts_with("model/")
+        || Format::from_media_type(media_type).is_some()
+        || declared_archive(media_type).is_some()
+        || ACCEPTED.contains(&media_type)
+}
+
+const ACCEPTED: &[&str] = &[
+    "application/octet-stream",
+    "application/x-www-form-urlencoded",
+    "application/x-tgif",
+    "text/plain",
+    "text/prs.wavefront-obj",
+];
+
+fn declared_archive(media_type: &str) -> Option<ArchiveKind> {
+    match media_type {
+        "application/zip" | "application/x-zip-compressed" => Some(ArchiveKind::Zip),
+        "application/x-tar" | "application/tar" => Some(ArchiveKind::Tar),
+        "application/gzip"
+        | "application/x-gzip"
+        | "application/x-gtar"
+        | "application/x-compressed-tar"
+        | "application/tar+gzip" => Some(ArchiveKind::TarGz),
+        _ => None,
+    }
+}
+
+async fn receive_raw(
+    request: Request,
+    declared: Option<String>,
+    name: Option<String>,
+    limits: &UploadLimits,
+) -> Result<Part, Problem> {
+    if let Some(declared) = &declared
+        && !is_readable(declared)
+    {
+        return Err(Problem::new(
+            Code::UnsupportedMediaType,
+            format!(
+                "'{declared}' is not read here; send model/obj, model/gltf+json, model/gltf-binary, model/stl, \
+                 application/octet-stream, an archive (application/zip, application/x-tar, application/gzip) or \
+                 multipart/form-data"
+            ),
+        ));
+    }
+    let name = name.or_else(|| disposition_name(request.headers()));
+    let mut stream = request.into_body().into_data_stream();
+    let mut body = BytesMut::new();
+    while let Some(chunk) = stream.next().await {
+        let chunk = chunk.map_err(|e| {
+            Problem::new(Code::InvalidRequest, "the body broke off while it arrived").logged(e)
+        })?;
+        if body.len() + chunk.len() > limits.max_body_bytes {
+            return Err(body_too_large(limits.max_body_bytes));
+        }
+        body.extend_from_slice(&chunk);
+    }
+    if body.is_empty() {
+        return Err(MeshError::Empty.into());
+    }
+    Ok(Part {
+        name: clean_name(name.as_deref()),
+        media_type: declared,
+        bytes: body.freeze(),
+        packed: false,
+    })
+}
+
+async fn receive_multipart(request: Request, limits: &UploadLimits) -> Result<Vec<Part>, Problem> {
+    let broken = |error: axum::extract::multipart::MultipartError| {
+        if error.status() == axum::http::StatusCode::PAYLOAD_TOO_LARGE {
+            body_too_large(limits.max_body_bytes)
+        } else {
+            Problem::new(Code::InvalidMultipart, error.body_text())
+        }
+    };
+    let mut multipart = Multipart::from_request(request, &())
+        .await
+        .map_err(|e| Problem::new(Code::InvalidMultipart, e.body_text()))?;
+    let mut parts = Vec::new();
+    while let Some(field) = multipart.next_field().await.map_err(broken)? {
+        if parts.len() >= limits.archive.max_members {
+            return Err(Problem::new(
+                Code::TooManyFiles,
+                format!("more than {} files were sent", limits.archive.max_members),
+            )
+            .with("limit_files", limits.archive.max_members));
+        }
+        let name = clean_name(field.file_name().or(field.name()));
+        let media_type = field.content_type().map(|t| {
+            t.split(';')
+                .next()
+                .unwrap_or_default()
+                .trim()
+                .to_ascii_lowercase()
+        });
+        let bytes = field.bytes().await.map_err(broken)?;
+        parts.push(Part {
+            name,
+            media_type,
+            bytes,
+            packed: false,
+        });
+    }
+    Ok(parts)
+}
+
+/// Unpacks archives and tells meshes, buffers and the rest apart.
+fn sort(parts: Vec<Part>, limits: &UploadLimits) -> Result<Upload, Problem> {
+    let mut files = Vec::new();
+    let mut archive_limits = limits.archive;
+    for part in parts {
+        let declared = part.media_type.as_deref().and_then(declared_archive);
+        let Some(kind) = archive::detect(&part.bytes).or(declared) else {
+            files.push(part);
+            continue;
+        };
+        for member in archive::unpack(kind, &part.bytes, &archive_limits)? {
+            archive_limits.max_members = archive_limits.max_members.saturating_sub(1);
+            archive_limits.max_bytes = archive_limits.max_bytes.saturating_sub(member.bytes.len());
+            files.push(Part {
+                name: member.path,
+                media_type: None,
+                bytes: member.bytes.into(),
+                packed: true,
+            });
+        }
+    }
+    let (mut meshes, mut buffers, mut ignored) = (Vec::new(), Vec::new(), Vec::new());
+    for file in files {
+        match role(&file) {
+            Role::Mesh => meshes.push(file),
+            Role::Buffer => buffers.push(file),
+            Role::Other => ignored.push(file.name),
+        }
+    }
+    if meshes.is_empty() {
+        return Err(Problem::new(
+            Code::NoFiles,
+            "no mesh file was sent; shapelex reads OBJ, glTF, GLB, PLY, STL and OFF",
+        )
+        .with("ignored", ignored));
+    }
+    let buffers = Arc::new(buffers);
+    let meshes = meshes
+        .into_iter()
+        .map(|file| UploadedMesh {
+            name: file.name,
+            media_type: file.media_type.filter(|t| Format::from_media_type(t).is_some()),
+            bytes: file.bytes,
+            buffers: buffers.clone(),
+        })
+        .collect();
+    Ok(Upload { meshes, ignored })
+}
+
+enum Role {
+    Mesh,
+    Buffer,
+    Other,
+}
+
+fn role(file: &Part) -> Role {
+    if Format::from_name(&file.name).is_some() {
+        return Role::Mesh;
+    }
+    let extension = file.name.rsplit_once('.').map(|(_, e)| e.to_ascii_lowercase());
+    match extension.as_deref().unwrap_or_default() {
+        "bin" => Role::Buffer,
+        "mtl" | "png" | "jpg" | "jpeg" | "webp" | "ktx" | "ktx2" | "tga" | "bmp" | "dds" => Role::Other,
+        _ if file.media_type.as_deref() == Some("application/gltf-buffer") => Role::Buffer,
+        _ if file.packed => Role::Other,
+        // A single file without a telling name may still be told by its bytes.
+        _ => Role::Mesh,
+    }
+}
+
+fn disposition_name(headers: &HeaderMap) -> Option<String> {
+    let value = headers.get(header::CONTENT_DISPOSITION)?.to_str().ok()?;
+    value.split(';').find_map(|part| {
+        let (key, value) = part.trim().split_once('=')?;
+        (key.trim().eq_ignore_ascii_case("filename")).then(|| value.trim().trim_matches('"').to_owned())
+    })
+}
+
+/// A name as it is kept: no folders from outside, no control characters, at most 200 characters.
+fn clean_name(name: Option<&str>) -> String {
+    let name: String = name
+        .unwrap_or_default()
+        .rsplit(['/', '\\'])
+        .next()
+        .unwrap_or_default()
+        .chars()
+        .filter(|c| !c.is_control())
+        .take(200)
+        .collect();
+    let name = name.trim();
+    if name.is_empty() {
+        "mesh".to_owned()
+    } else {
+        name.to_owned()
+    }
+}
