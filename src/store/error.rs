@@ -70,14 +70,6 @@ pub enum StoreError {
         /// The directory.
         path: PathBuf,
     },
-    /// The file system does not let the process in, for a reason that is not the data's.
-    #[error("{what}: {detail}")]
-    Refused {
-        /// What was being done.
-        what: String,
-        /// The failure.
-        detail: String,
-    },
     /// The file system or the key-value store failed.
     #[error("{what}: {detail}")]
     Io {

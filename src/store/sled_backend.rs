@@ -25,7 +25,7 @@ impl SledBackend {
             .cache_capacity(cache_bytes)
             .mode(sled::Mode::LowSpace)
             .flush_every_ms(None);
-        let db = caught("open the key-value store", || config.open()).map_err(unopened)?;
+        let db = caught("open the key-value store", || Ok(config.open().map_err(unopened)))??;
         Ok(Self { db })
     }
 }
@@ -49,17 +49,30 @@ fn remove_unfinished_snapshots(path: &Path) -> Result<(), StoreError> {
 
 /// An engine that does not open its own directory calls that a defect, an unsupported version or a short read; all
 /// are damage to us, and have a way out. What the file system refuses has none, and stays what it is.
-fn unopened(error: StoreError) -> StoreError {
+fn unopened(error: sled::Error) -> StoreError {
+    use std::io::ErrorKind as Kind;
     match error {
-        StoreError::Io { detail, .. } => StoreError::damaged("the key-value store", detail),
-        other => other,
+        sled::Error::Io(error)
+            if matches!(
+                error.kind(),
+                Kind::PermissionDenied
+                    | Kind::ReadOnlyFilesystem
+                    | Kind::OutOfMemory
+                    | Kind::ResourceBusy
+                    | Kind::StorageFull
+                    | Kind::QuotaExceeded
+            ) =>
+        {
+            StoreError::io("open the key-value store", &error)
+        }
+        other => StoreError::damaged("the key-value store", other.to_string()),
     }
 }
 
 fn caught<T>(what: &str, work: impl FnOnce() -> sled::Result<T>) -> Result<T, StoreError> {
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(value)) => Ok(value),
-        Ok(Err(sled::Error::Io(error))) => Err(engine_io(what, &error)),
+        Ok(Err(sled::Error::Io(error))) => Err(StoreError::io(what, &error)),
         Ok(Err(error @ sled::Error::Corruption { .. })) => {
             Err(StoreError::damaged("the key-value store", error.to_string()))
         }
@@ -71,19 +84,6 @@ fn caught<T>(what: &str, work: impl FnOnce() -> sled::Result<T>) -> Result<T, St
             "the key-value store",
             format!("the engine panicked: {}", panic_text(panic.as_ref())),
         )),
-    }
-}
-
-fn engine_io(what: &str, error: &std::io::Error) -> StoreError {
-    use std::io::ErrorKind as Kind;
-    match error.kind() {
-        Kind::PermissionDenied | Kind::ReadOnlyFilesystem | Kind::OutOfMemory | Kind::ResourceBusy => {
-            StoreError::Refused {
-                what: what.to_owned(),
-                detail: error.to_string(),
-            }
-        }
-        _ => StoreError::io(what, error),
     }
 }
 
