@@ -21,9 +21,14 @@ pub mod mesh;
 pub mod parameters;
 pub mod pipeline;
 pub mod ranking;
+pub mod sample;
 pub mod signature;
 pub mod spectral;
 
+#[cfg(feature = "service")]
+pub mod cli;
+#[cfg(feature = "service")]
+pub mod config;
 #[cfg(feature = "service")]
 pub mod http;
 #[cfg(feature = "service")]
@@ -32,3 +37,5 @@ pub mod jobs;
 pub mod model;
 #[cfg(feature = "service")]
 pub mod store;
+#[cfg(feature = "service")]
+pub mod telemetry;

@@ -45,8 +45,8 @@ pub fn whiten(mesh: &TriMesh) -> Result<TriMesh, MeshError> {
         let largest = values[2];
         let flat = values[0] < FLAT * largest;
         let smallest = values[usize::from(flat)];
-        let flattened = flat && values[0] == 0.0;
-        if iteration == ITERATIONS || (largest < ISOTROPIC * smallest && (!flat || flattened)) {
+        let pressed = !flat || iteration > 0;
+        if iteration == ITERATIONS || (pressed && largest < ISOTROPIC * smallest) {
             break;
         }
         let factor: [f64; 3] = std::array::from_fn(|k| {

@@ -1,0 +1,234 @@
+//! The service's API as the commands use it: over HTTP to a running service, or to one inside this process.
+//!
+//! Local commands call the very routes a client calls, without a socket in between, so there is one implementation of
+//! uploading, indexing and querying.
+
+use super::CliError;
+use crate::config::{Config, DEFAULT_LISTEN};
+use crate::http::{AppState, router};
+use axum::Router;
+use axum::body::Body;
+use axum::http::Request;
+use serde_json::Value;
+use std::path::Path;
+use std::time::Duration;
+use tower::ServiceExt;
+
+/// Longest answer that is read; a ranking of ten thousand classes has a few megabytes.
+const MAX_ANSWER_BYTES: u64 = 256 << 20;
+/// How long the in-process service gets to put its work down.
+const CLOSE_WITHIN: Duration = Duration::from_secs(30);
+
+/// Where a command works.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct TargetArgs {
+    /// Data directory to work in, when no service runs on it [default: shapelex-data]
+    #[arg(long, env = "SHAPELEX_DATA", value_name = "DIR", conflicts_with = "server")]
+    pub data: Option<std::path::PathBuf>,
+    /// Running service to work with, such as http://127.0.0.1:7345
+    #[arg(long, env = "SHAPELEX_SERVER", value_name = "URL")]
+    pub server: Option<String>,
+}
+
+impl TargetArgs {
+    /// Connects, or opens the data directory.
+    ///
+    /// # Errors
+    /// As [`Client::remote`] and [`Client::local`].
+    pub fn client(&self) -> Result<Client, CliError> {
+        match &self.server {
+            Some(url) => Client::remote(url),
+            None => Client::local(self.data.as_deref()),
+        }
+    }
+}
+
+/// A body to send.
+pub enum Payload {
+    /// None.
+    Empty,
+    /// JSON.
+    Json(Value),
+    /// Bytes with their content type.
+    Bytes(String, Vec<u8>),
+}
+
+/// Why a call gave no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum CallError {
+    /// The service refused, and said why.
+    #[error("{detail}")]
+    Refused {
+        /// The stable code of the problem.
+        code: String,
+        /// One sentence.
+        detail: String,
+    },
+    /// No service answered.
+    #[error("{0}")]
+    Unreachable(String),
+}
+
+impl From<CallError> for CliError {
+    fn from(error: CallError) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+/// A service to talk to.
+pub struct Client(Transport);
+
+enum Transport {
+    Remote {
+        agent: ureq::Agent,
+        base: String,
+    },
+    Local {
+        runtime: tokio::runtime::Runtime,
+        router: Router,
+        state: AppState,
+    },
+}
+
+impl Client {
+    /// A running service. Nothing is sent yet.
+    ///
+    /// # Errors
+    /// [`CliError::Usage`] where the address is not `http://…`.
+    pub fn remote(url: &str) -> Result<Self, CliError> {
+        let base = url.trim_end_matches('/').to_owned();
+        if !base.starts_with("http://") {
+            return Err(CliError::Usage(format!(
+                "--server {url}: expected an address such as http://{DEFAULT_LISTEN}"
+            )));
+        }
+        let agent = ureq::Agent::config_builder()
+            .http_status_as_error(false)
+            .timeout_connect(Some(Duration::from_secs(10)))
+            .build()
+            .new_agent();
+        Ok(Self(Transport::Remote { agent, base }))
+    }
+
+    /// The service inside this process, on a data directory nobody else uses.
+    ///
+    /// # Errors
+    /// [`CliError::Failed`] where the directory cannot be opened.
+    pub fn local(data: Option<&Path>) -> Result<Self, CliError> {
+        let mut config = Config::default();
+        if let Some(data) = data {
+            config.data = data.to_owned();
+        }
+        // One person waits for one answer: every core learns, and no query is cut short.
+        let mut service = config.service();
+        service.indexing_threads = service.query_threads;
+        service.query_timeout = Duration::from_secs(24 * 3600);
+        service.query_wait = service.query_timeout;
+        service.max_body_bytes = service.limits.max_bytes;
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(2)
+            .enable_all()
+            .build()?;
+        let state = {
+            let _inside = runtime.enter();
+            AppState::open(service).map_err(|error| CliError::Failed(error.to_string()))?
+        };
+        let router = router(state.clone());
+        Ok(Self(Transport::Local {
+            runtime,
+            router,
+            state,
+        }))
+    }
+
+    /// Sends a request. `path` begins with `/` and is encoded already.
+    ///
+    /// # Errors
+    /// [`CallError::Refused`] for every status but 2xx, [`CallError::Unreachable`] where nobody answers.
+    pub fn call(&self, method: &str, path: &str, payload: Payload) -> Result<Value, CallError> {
+        let (content_type, body) = match payload {
+            Payload::Empty => (None, Vec::new()),
+            Payload::Json(value) => (
+                Some("application/json".to_owned()),
+                value.to_string().into_bytes(),
+            ),
+            Payload::Bytes(content_type, bytes) => (Some(content_type), bytes),
+        };
+        let (status, bytes) = self.send(method, path, content_type, body)?;
+        let value = serde_json::from_slice(&bytes).unwrap_or(Value::Null);
+        if (200..300).contains(&status) {
+            return Ok(value);
+        }
+        let text = |name: &str| value.get(name).and_then(Value::as_str).map(str::to_owned);
+        Err(CallError::Refused {
+            code: text("code").unwrap_or_else(|| status.to_string()),
+            detail: text("detail").unwrap_or_else(|| format!("the service answered with status {status}")),
+        })
+    }
+
+    fn send(
+        &self,
+        method: &str,
+        path: &str,
+        content_type: Option<String>,
+        body: Vec<u8>,
+    ) -> Result<(u16, Vec<u8>), CallError> {
+        match &self.0 {
+            Transport::Remote { agent, base } => {
+                let mut request = ureq::http::Request::builder()
+                    .method(method)
+                    .uri(format!("{base}{path}"));
+                if let Some(content_type) = content_type {
+                    request = request.header("content-type", content_type);
+                }
+                let unreachable = |error: ureq::Error| CallError::Unreachable(format!("{base}: {error}"));
+                let request = request
+                    .body(body)
+                    .map_err(|error| CallError::Unreachable(format!("{base}{path}: {error}")))?;
+                let mut response = agent.run(request).map_err(unreachable)?;
+                let status = response.status().as_u16();
+                let bytes = response
+                    .body_mut()
+                    .with_config()
+                    .limit(MAX_ANSWER_BYTES)
+                    .read_to_vec()
+                    .map_err(unreachable)?;
+                Ok((status, bytes))
+            }
+            Transport::Local { runtime, router, .. } => {
+                let mut request = Request::builder().method(method).uri(path);
+                if let Some(content_type) = content_type {
+                    request = request.header("content-type", content_type);
+                }
+                let request = request
+                    .header("content-length", body.len())
+                    .body(Body::from(body))
+                    .map_err(|error| CallError::Unreachable(error.to_string()))?;
+                runtime.block_on(async {
+                    let response = match router.clone().oneshot(request).await {
+                        Ok(response) => response,
+                        Err(never) => match never {},
+                    };
+                    let status = response.status().as_u16();
+                    let bytes = axum::body::to_bytes(response.into_body(), MAX_ANSWER_BYTES as usize)
+                        .await
+                        .map_err(|error| CallError::Unreachable(error.to_string()))?;
+                    Ok((status, bytes.to_vec()))
+                })
+            }
+        }
+    }
+}
+
+impl Drop for Client {
+    fn drop(&mut self) {
+        if let Transport::Local { state, .. } = &self.0 {
+            state.stopping.cancel();
+            state.jobs.shutdown(CLOSE_WITHIN);
+            // Everything acknowledged is on disk already; this only spares the next start some work.
+            if let Err(error) = state.store.flush() {
+                tracing::warn!(%error, "the last flush failed");
+            }
+        }
+    }
+}

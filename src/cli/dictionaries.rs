@@ -1,0 +1,231 @@
+//! Dictionaries in a safetensors file, readable from Python.
+//!
+//! One tensor per class and channel, named `<class>/<channel>`: M rows × L columns of little-endian f32, one atom per
+//! column. The metadata has one key, `shapelex`: JSON with the file's format, the parameters and the classes. Classes'
+//! names may hold a `/`, so the channel is what follows the last one.
+
+use super::CliError;
+use crate::coding::Dictionary;
+use crate::parameters::{Channel, Parameters};
+use crate::ranking::{Index, IndexedClass};
+use faer::Mat;
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+use std::sync::Arc;
+
+/// The file format's number; a reader refuses greater ones.
+const FORMAT: u32 = 1;
+/// The metadata's only key.
+const KEY: &str = "shapelex";
+
+/// What a file of dictionaries holds. Labels are the classes' names.
+#[derive(Clone, Debug)]
+pub struct Exported {
+    /// Classes with their dictionaries, and the parameters they were learnt with.
+    pub index: Index,
+    /// What the file says about each class.
+    pub classes: Vec<ExportedClass>,
+}
+
+/// What a file says about a class.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ExportedClass {
+    /// Its name.
+    pub name: String,
+    /// Shapes it was learnt from.
+    pub shapes: usize,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Metadata {
+    format: u32,
+    parameters: Parameters,
+    classes: Vec<ExportedClass>,
+}
+
+/// Writes a file's contents. Equal input gives equal bytes.
+///
+/// # Errors
+/// [`CliError::Failed`] where the format's library refuses.
+pub fn to_bytes(exported: &Exported) -> Result<Vec<u8>, CliError> {
+    let failed = |error: &dyn std::fmt::Display| CliError::Failed(format!("writing safetensors: {error}"));
+    let metadata = Metadata {
+        format: FORMAT,
+        parameters: exported.index.parameters.clone(),
+        classes: exported.classes.clone(),
+    };
+    let metadata = serde_json::to_string(&metadata).map_err(|error| failed(&error))?;
+    let mut tensors: BTreeMap<String, (Vec<usize>, Vec<u8>)> = BTreeMap::new();
+    for class in &exported.index.classes {
+        for (channel, dictionary) in &class.dictionaries {
+            let atoms = dictionary.atoms();
+            let (rows, columns) = (atoms.nrows(), atoms.ncols());
+            let bytes = (0..rows)
+                .flat_map(|i| (0..columns).map(move |j| atoms[(i, j)] as f32))
+                .flat_map(f32::to_le_bytes)
+                .collect();
+            let name = format!("{}/{}", class.label, channel_name(*channel));
+            tensors.insert(name, (vec![rows, columns], bytes));
+        }
+    }
+    let views = tensors
+        .iter()
+        .map(|(name, (shape, bytes))| Ok((name, TensorView::new(Dtype::F32, shape.clone(), bytes)?)))
+        .collect::<Result<Vec<_>, safetensors::SafeTensorError>>()
+        .map_err(|error| failed(&error))?;
+    safetensors::serialize(views, Some(HashMap::from([(KEY.to_owned(), metadata)])))
+        .map_err(|error| failed(&error))
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// [`CliError::Failed`] with the path and what is wrong.
+pub fn load(path: &Path) -> Result<Exported, CliError> {
+    let bytes = std::fs::read(path).map_err(|error| CliError::at(path, error))?;
+    from_bytes(&bytes).map_err(|reason| CliError::at(path, reason))
+}
+
+/// Reads a file's contents; every dictionary is checked.
+///
+/// # Errors
+/// One sentence.
+pub fn from_bytes(bytes: &[u8]) -> Result<Exported, String> {
+    let unreadable = |error: &dyn std::fmt::Display| format!("not a file of shapelex dictionaries: {error}");
+    let (_, header) = SafeTensors::read_metadata(bytes).map_err(|error| unreadable(&error))?;
+    let metadata = header
+        .metadata()
+        .as_ref()
+        .and_then(|m| m.get(KEY))
+        .ok_or_else(|| unreadable(&"its metadata has no entry 'shapelex'"))?;
+    #[derive(Deserialize)]
+    struct Version {
+        format: u32,
+    }
+    let version: Version = serde_json::from_str(metadata).map_err(|error| unreadable(&error))?;
+    if version.format != FORMAT {
+        return Err(format!(
+            "the file has format {}, this shapelex reads format {FORMAT}",
+            version.format
+        ));
+    }
+    let metadata: Metadata = serde_json::from_str(metadata).map_err(|error| unreadable(&error))?;
+    metadata
+        .parameters
+        .validate()
+        .map_err(|error| error.to_string())?;
+    let tensors = SafeTensors::deserialize(bytes).map_err(|error| unreadable(&error))?;
+    let channels = metadata.parameters.channels();
+    let classes = metadata
+        .classes
+        .iter()
+        .map(|class| {
+            let dictionaries = channels
+                .iter()
+                .map(|&channel| {
+                    let name = format!("{}/{}", class.name, channel_name(channel));
+                    let tensor = tensors
+                        .tensor(&name)
+                        .map_err(|_| format!("tensor '{name}' is missing"))?;
+                    let dictionary =
+                        dictionary(&tensor).map_err(|reason| format!("tensor '{name}': {reason}"))?;
+                    Ok((channel, Arc::new(dictionary)))
+                })
+                .collect::<Result<BTreeMap<_, _>, String>>()?;
+            Ok(IndexedClass {
+                label: class.name.clone(),
+                dictionaries,
+                shapes: Vec::new(),
+            })
+        })
+        .collect::<Result<Vec<_>, String>>()?;
+    Ok(Exported {
+        index: Index {
+            parameters: metadata.parameters,
+            classes,
+        },
+        classes: metadata.classes,
+    })
+}
+
+fn dictionary(tensor: &TensorView<'_>) -> Result<Dictionary, String> {
+    let &[rows, columns] = tensor.shape() else {
+        return Err(format!(
+            "expected a matrix, found {} dimensions",
+            tensor.shape().len()
+        ));
+    };
+    if tensor.dtype() != Dtype::F32 {
+        return Err(format!("expected f32, found {:?}", tensor.dtype()));
+    }
+    let (values, _) = tensor.data().as_chunks::<4>();
+    // The library has checked that the data has rows × columns values.
+    let atoms = Mat::from_fn(rows, columns, |i, j| {
+        f64::from(f32::from_le_bytes(values[i * columns + j]))
+    });
+    Dictionary::new(atoms).map_err(|error| error.to_string())
+}
+
+/// The channel's name in tensors: as it is serialised everywhere else.
+fn channel_name(channel: Channel) -> &'static str {
+    match channel {
+        Channel::Plain => "plain",
+        Channel::Whitened => "whitened",
+        Channel::FixedGrid => "fixed_grid",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn exported() -> Exported {
+        let atoms = Mat::from_fn(3, 2, |i, j| if i == j { 1.0 } else { 0.0 });
+        let dictionary = Arc::new(Dictionary::new(atoms).unwrap());
+        let class = |label: &str| IndexedClass {
+            label: label.to_owned(),
+            dictionaries: BTreeMap::from([(Channel::Plain, dictionary.clone())]),
+            shapes: Vec::new(),
+        };
+        Exported {
+            index: Index {
+                parameters: Parameters::default(),
+                classes: vec![class("cat"), class("great dane/old")],
+            },
+            classes: ["cat", "great dane/old"]
+                .map(|name| ExportedClass {
+                    name: name.to_owned(),
+                    shapes: 6,
+                })
+                .to_vec(),
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let before = exported();
+        let bytes = to_bytes(&before).unwrap();
+        assert_eq!(bytes, to_bytes(&before).unwrap());
+        let after = from_bytes(&bytes).unwrap();
+        assert_eq!(after.classes, before.classes);
+        assert_eq!(after.index.parameters, before.index.parameters);
+        let atoms = |e: &Exported, i: usize| e.index.classes[i].dictionaries[&Channel::Plain].atoms().clone();
+        assert_eq!(atoms(&after, 1), atoms(&before, 1));
+    }
+
+    #[test]
+    fn other_files_are_refused() {
+        assert!(from_bytes(b"").unwrap_err().contains("not a file"));
+        let bytes = to_bytes(&exported()).unwrap();
+        assert!(from_bytes(&bytes[..bytes.len() - 4]).is_err(), "cut short");
+        let mut missing = exported();
+        missing.classes.push(ExportedClass {
+            name: "dog".to_owned(),
+            shapes: 1,
+        });
+        let error = from_bytes(&to_bytes(&missing).unwrap()).unwrap_err();
+        assert_eq!(error, "tensor 'dog/plain' is missing");
+    }
+}

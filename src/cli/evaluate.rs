@@ -1,0 +1,266 @@
+//! `shapelex evaluate`: how often the method is right on a folder per class.
+
+use super::files::{LabelledFile, MeshFile, labelled_files};
+use super::progress::Progress;
+use super::refused::Refused;
+use super::{CliError, ParameterArgs, evaluation_report, output};
+use crate::benchmark::{Evaluation, LabelledShape, Protocol, evaluate};
+use crate::cancel::Cancel;
+use crate::mesh::{Limits, MeshError, TriangleSoup, read, read_poses};
+use crate::parameters::Parameters;
+use crate::pipeline::describe_both;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// A protocol by name; the numbers come from other flags.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ProtocolName {
+    /// Every shape is queried once, all others train
+    LeaveOneOut,
+    /// In order of the names the 1st, 3rd, 5th … shape of a class trains, the others are queried
+    EvenOdd,
+    /// One shape per class trains, drawn at random, all others are queried
+    OneShot,
+    /// Every class is dealt into folds, each is queried once
+    KFold,
+}
+
+/// Arguments of `evaluate`.
+#[derive(Debug, clap::Args)]
+pub struct EvaluateArgs {
+    /// Folder with a folder per class
+    #[arg(value_name = "DIR")]
+    pub dir: PathBuf,
+    /// How shapes are split into training shapes and queries; may be repeated
+    #[arg(long, value_enum, value_name = "PROTOCOL",
+          default_values_t = [ProtocolName::LeaveOneOut, ProtocolName::EvenOdd, ProtocolName::OneShot])]
+    pub protocol: Vec<ProtocolName>,
+    /// Classes that count as one another's right answer, such as --same michael,david; may be repeated
+    #[arg(long, value_name = "CLASS,CLASS…")]
+    pub same: Vec<String>,
+    /// Leave out classes with fewer shapes
+    #[arg(long, value_name = "COUNT", default_value_t = 2)]
+    pub min_shapes: usize,
+    /// Sample this many poses of every animated glTF; other files count once
+    #[arg(long, value_name = "COUNT")]
+    pub poses: Option<usize>,
+    /// Independent draws of one-shot
+    #[arg(long, value_name = "COUNT", default_value_t = 5)]
+    pub draws: usize,
+    /// Folds of k-fold
+    #[arg(long, value_name = "COUNT", default_value_t = 6)]
+    pub folds: usize,
+    /// Seed of the draws and folds
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    pub split_seed: u64,
+    /// How many of the worst queries are listed
+    #[arg(long, value_name = "COUNT", default_value_t = 10)]
+    pub worst: usize,
+    /// The method's parameters.
+    #[command(flatten)]
+    pub parameters: ParameterArgs,
+}
+
+/// Everything an evaluation found out.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// Shapes by class.
+    pub classes: BTreeMap<String, usize>,
+    /// Shapes in all.
+    pub shapes: usize,
+    /// Files that could not be used.
+    pub refused: Vec<Refused>,
+    /// Classes left out because they have too few shapes.
+    pub left_out: Vec<String>,
+    /// What counted.
+    pub parameters: Parameters,
+    /// One outcome per protocol.
+    pub protocols: Vec<Outcome>,
+    /// Wall-clock time of the whole, in seconds.
+    pub seconds: f64,
+}
+
+/// The outcome of one protocol.
+#[derive(Debug, Serialize)]
+pub struct Outcome {
+    /// The protocol's name.
+    pub name: &'static str,
+    /// Share of queries answered with the right class, 0 to 1.
+    pub top1: f64,
+    /// The evaluation, its queries cut to the worst.
+    #[serde(flatten)]
+    pub evaluation: Evaluation,
+}
+
+/// Describes every file once, then runs the protocols.
+///
+/// # Errors
+/// [`CliError::Usage`] where fewer than two classes are left; [`CliError::Reported`] where a file was refused, after
+/// the evaluation of the others.
+pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
+    let began = Instant::now();
+    let parameters = args.parameters.parameters()?;
+    let same: Vec<Vec<String>> = args
+        .same
+        .iter()
+        .map(|group| group.split(',').map(|c| c.trim().to_owned()).collect())
+        .collect();
+    let files = labelled_files(&args.dir)?;
+    let (mut shapes, refused) = describe(&files, args.poses, &parameters);
+    let (classes, left_out) = keep_classes(&mut shapes, args.min_shapes);
+    for group in &same {
+        if let Some(unknown) = group
+            .iter()
+            .find(|&c| !classes.contains_key(c) && !left_out.contains(c))
+        {
+            return Err(CliError::Usage(format!(
+                "--same: there is no class '{unknown}' in {}",
+                args.dir.display()
+            )));
+        }
+    }
+    if classes.len() < 2 {
+        return Err(CliError::Failed(format!(
+            "{}: {} classes with at least {} usable shapes; an evaluation needs two",
+            args.dir.display(),
+            classes.len(),
+            args.min_shapes
+        )));
+    }
+    let mut protocols = Vec::new();
+    for &name in &args.protocol {
+        let protocol = protocol(name, args);
+        let progress = Progress::new(protocol.name(), 0);
+        let mut evaluation = evaluate(
+            &shapes,
+            protocol,
+            &parameters,
+            &same,
+            &Cancel::new(),
+            &|done, total| progress.set(done, total),
+        )?;
+        progress.finish();
+        evaluation.queries.truncate(args.worst);
+        protocols.push(Outcome {
+            name: protocol.name(),
+            top1: evaluation.top1(),
+            evaluation,
+        });
+    }
+    let report = Report {
+        classes,
+        shapes: shapes.len(),
+        refused,
+        left_out,
+        parameters,
+        protocols,
+        seconds: began.elapsed().as_secs_f64(),
+    };
+    if json {
+        output::json(&report)?;
+    } else {
+        output::line(&evaluation_report::text(&report))?;
+    }
+    if report.refused.is_empty() {
+        Ok(())
+    } else {
+        Err(CliError::Reported)
+    }
+}
+
+fn protocol(name: ProtocolName, args: &EvaluateArgs) -> Protocol {
+    let seed = args.split_seed;
+    match name {
+        ProtocolName::LeaveOneOut => Protocol::LeaveOneOut,
+        ProtocolName::EvenOdd => Protocol::EvenOdd,
+        ProtocolName::OneShot => Protocol::OneShot {
+            draws: args.draws,
+            seed,
+        },
+        ProtocolName::KFold => Protocol::KFold {
+            folds: args.folds,
+            seed,
+        },
+    }
+}
+
+/// Describes every file on all cores. Files that cannot be used come back with their reason.
+fn describe(
+    files: &[LabelledFile],
+    poses: Option<usize>,
+    parameters: &Parameters,
+) -> (Vec<LabelledShape>, Vec<Refused>) {
+    let progress = Progress::new("describe", files.len());
+    let results: Vec<Result<Vec<LabelledShape>, Refused>> = files
+        .par_iter()
+        .map(|file| {
+            let result = describe_file(file, poses, parameters);
+            progress.tick();
+            result.map_err(|error| Refused::new(&file.path, error))
+        })
+        .collect();
+    progress.finish();
+    let mut shapes = Vec::new();
+    let mut refused = Vec::new();
+    for result in results {
+        match result {
+            Ok(described) => shapes.extend(described),
+            Err(refusal) => refused.push(refusal),
+        }
+    }
+    (shapes, refused)
+}
+
+fn describe_file(
+    file: &LabelledFile,
+    poses: Option<usize>,
+    parameters: &Parameters,
+) -> Result<Vec<LabelledShape>, CliError> {
+    let limits = Limits::default();
+    let mesh = MeshFile::load(&file.path, limits.max_bytes)?;
+    let one = |mesh: &MeshFile| -> Result<Vec<(String, TriangleSoup)>, MeshError> {
+        Ok(vec![(mesh.name.clone(), read(&mesh.source(), &limits)?.1)])
+    };
+    let soups = match poses {
+        None => one(&mesh)?,
+        Some(count) => match read_poses(&mesh.source(), count, &limits) {
+            Ok((_, poses)) => poses
+                .into_iter()
+                .map(|pose| (format!("{} {}", mesh.name, pose.label), pose.soup))
+                .collect(),
+            Err(MeshError::NoAnimation) => one(&mesh)?,
+            Err(error) => return Err(error.into()),
+        },
+    };
+    soups
+        .into_iter()
+        .map(|(name, soup)| {
+            let (training, query) = describe_both(soup, parameters, &Cancel::new())?;
+            Ok(LabelledShape {
+                class: file.class.clone(),
+                name,
+                training,
+                query,
+            })
+        })
+        .collect()
+}
+
+/// Drops shapes of classes with too few; returns the others' counts and the names of the dropped.
+fn keep_classes(shapes: &mut Vec<LabelledShape>, least: usize) -> (BTreeMap<String, usize>, Vec<String>) {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for shape in shapes.iter() {
+        *counts.entry(shape.class.clone()).or_default() += 1;
+    }
+    let left_out = counts
+        .iter()
+        .filter(|&(_, &n)| n < least)
+        .map(|(class, _)| class.clone())
+        .collect();
+    counts.retain(|_, n| *n >= least);
+    shapes.retain(|shape| counts.contains_key(&shape.class));
+    (counts, left_out)
+}

@@ -1,0 +1,142 @@
+//! An evaluation as text.
+
+use super::evaluate::{Outcome, Report};
+use super::output::table;
+
+/// Confusion matrices with more classes than this do not fit a screen; they are listed instead.
+const MATRIX_CLASSES: usize = 26;
+
+/// The whole report.
+pub fn text(report: &Report) -> String {
+    let mut parts = vec![format!(
+        "{} shapes in {} classes, {:.1} s",
+        report.shapes,
+        report.classes.len(),
+        report.seconds
+    )];
+    if !report.left_out.is_empty() {
+        parts.push(format!(
+            "left out, too few shapes: {}",
+            report.left_out.join(", ")
+        ));
+    }
+    for refused in &report.refused {
+        parts.push(format!("refused: {}: {}", refused.file, refused.reason));
+    }
+    parts.extend(report.protocols.iter().map(outcome));
+    parts.push(summary(report));
+    parts.join("\n")
+}
+
+fn summary(report: &Report) -> String {
+    let rows: Vec<Vec<String>> = report
+        .protocols
+        .iter()
+        .map(|o| {
+            let e = &o.evaluation;
+            vec![
+                o.name.to_owned(),
+                e.correct.to_string(),
+                e.total.to_string(),
+                format!("{:.2} %", 100.0 * o.top1),
+            ]
+        })
+        .collect();
+    format!(
+        "\n{}",
+        table(&["protocol", ">right", ">queries", ">top-1"], &rows)
+    )
+}
+
+fn outcome(outcome: &Outcome) -> String {
+    let e = &outcome.evaluation;
+    let mut text = format!(
+        "\n{}: {} of {} right ({:.2} %)",
+        outcome.name,
+        e.correct,
+        e.total,
+        100.0 * outcome.top1
+    );
+    if e.not_queried > 0 {
+        text += &format!("; {} not queried, alone in their class", e.not_queried);
+    }
+    text += "\n";
+    text += &confusion(outcome);
+    if !e.queries.is_empty() {
+        let rows: Vec<Vec<String>> = e
+            .queries
+            .iter()
+            .map(|q| {
+                let (answered, score) = q.ranked.first().cloned().unwrap_or_default();
+                vec![
+                    q.class.clone(),
+                    q.name.clone(),
+                    answered,
+                    format!("{score:.5}"),
+                    q.true_rank.to_string(),
+                    format!("{:+.4}", q.error_margin),
+                ]
+            })
+            .collect();
+        text += "\nworst queries; an error margin above 0 is a mistake\n";
+        text += &table(
+            &[
+                "class",
+                "shape",
+                "answered",
+                ">score",
+                ">rank of the true",
+                ">error margin",
+            ],
+            &rows,
+        );
+    }
+    text
+}
+
+/// Rows are true classes, columns answers, in the same order.
+fn confusion(outcome: &Outcome) -> String {
+    let confusion = &outcome.evaluation.confusion;
+    let mut classes: Vec<&str> = confusion.keys().map(String::as_str).collect();
+    for answers in confusion.values() {
+        for answer in answers.keys() {
+            if !classes.contains(&answer.as_str()) {
+                classes.push(answer);
+            }
+        }
+    }
+    if classes.len() > MATRIX_CLASSES {
+        let mistakes: Vec<String> = confusion
+            .iter()
+            .flat_map(|(class, answers)| {
+                answers
+                    .iter()
+                    .filter(move |(answer, _)| *answer != class)
+                    .map(move |(answer, n)| format!("{class} taken for {answer}: {n}"))
+            })
+            .collect();
+        return if mistakes.is_empty() {
+            "no class was taken for another".to_owned()
+        } else {
+            mistakes.join("\n")
+        };
+    }
+    let numbers: Vec<String> = (1..=classes.len()).map(|i| format!(">{i}")).collect();
+    let mut header = vec![">", "class"];
+    header.extend(numbers.iter().map(String::as_str));
+    let rows: Vec<Vec<String>> = classes
+        .iter()
+        .enumerate()
+        .filter_map(|(i, class)| {
+            let answers = confusion.get(*class)?;
+            let mut row = vec![(i + 1).to_string(), (*class).to_owned()];
+            row.extend(
+                classes
+                    .iter()
+                    .map(|answer| answers.get(*answer).map_or("·".to_owned(), usize::to_string)),
+            );
+            Some(row)
+        })
+        .collect();
+    table(&header, &rows)
+}

@@ -1,0 +1,30 @@
+//! `shapelex health`: whether a service answers, for container health checks.
+
+use super::client::{Client, Payload};
+use super::{CliError, output};
+use crate::config::DEFAULT_LISTEN;
+
+/// Arguments of `health`.
+#[derive(Debug, clap::Args)]
+pub struct HealthArgs {
+    /// The service's address
+    #[arg(long, env = "SHAPELEX_SERVER", value_name = "URL", default_value_t = format!("http://{DEFAULT_LISTEN}"))]
+    pub server: String,
+    /// Ask whether it is ready for requests, not only whether it lives
+    #[arg(long)]
+    pub ready: bool,
+}
+
+/// Asks once.
+///
+/// # Errors
+/// [`CliError::Failed`] where the service does not answer, or says that it is not well.
+pub fn run(args: &HealthArgs, json: bool) -> Result<(), CliError> {
+    let path = if args.ready { "/readyz" } else { "/healthz" };
+    let answer = Client::remote(&args.server)?.call("GET", path, Payload::Empty)?;
+    if json {
+        output::json(&answer)
+    } else {
+        output::line(if args.ready { "ready" } else { "alive" })
+    }
+}

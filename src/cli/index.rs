@@ -1,0 +1,158 @@
+//! `shapelex index`: a folder per class → a learnt index.
+
+use super::client::{CallError, Client, TargetArgs};
+use super::files::{LabelledFile, MeshFile, labelled_files};
+use super::progress::Progress;
+use super::refused::Refused;
+use super::{CliError, ParameterArgs, api, output};
+use crate::mesh::Limits;
+use rayon::prelude::*;
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Uploads under way at the same time: enough to keep two cores and the disk busy.
+const UPLOADS: usize = 4;
+
+/// Arguments of `index`.
+#[derive(Debug, clap::Args)]
+pub struct IndexArgs {
+    /// Folder with a folder per class; a file in DIR itself is a class of its own
+    #[arg(value_name = "DIR")]
+    pub dir: PathBuf,
+    /// Where the index is.
+    #[command(flatten)]
+    pub target: TargetArgs,
+    /// Sample this many poses of every animated glTF; other files count once
+    #[arg(long, value_name = "COUNT")]
+    pub poses: Option<usize>,
+    /// Learn from the files that could be read even where others could not
+    #[arg(long)]
+    pub keep_going: bool,
+    /// The method's parameters.
+    #[command(flatten)]
+    pub parameters: ParameterArgs,
+}
+
+/// What indexing led to.
+#[derive(Debug, Serialize)]
+struct Report {
+    /// Shapes added by class.
+    added: BTreeMap<String, usize>,
+    /// Shapes that were there already.
+    existing: usize,
+    /// Files that could not be used.
+    refused: Vec<Refused>,
+    /// The reindex, as the API tells it; `null` where there was none.
+    job: Value,
+    /// Wall-clock time of the whole.
+    seconds: f64,
+}
+
+/// Uploads every file, then learns what is stale. A file that cannot be read stops it before the learning, unless
+/// `--keep-going`; what was uploaded stays, so a second run goes on from there.
+///
+/// # Errors
+/// [`CliError::Reported`] where files were refused; [`CliError::Failed`] where the service or the learning failed.
+pub fn run(args: &IndexArgs, json: bool) -> Result<(), CliError> {
+    let began = Instant::now();
+    args.parameters.parameters()?;
+    let files = labelled_files(&args.dir)?;
+    let client = args.target.client()?;
+    let progress = Progress::new("upload", files.len());
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(UPLOADS)
+        .build()
+        .map_err(|error| CliError::Failed(format!("no threads for uploading: {error}")))?;
+    let outcomes: Vec<Result<api::Uploaded, CliError>> = pool.install(|| {
+        files
+            .par_iter()
+            .map(|file| {
+                let outcome = upload(&client, file, args.poses);
+                progress.tick();
+                outcome
+            })
+            .collect()
+    });
+    progress.finish();
+    let mut report = Report {
+        added: BTreeMap::new(),
+        existing: 0,
+        refused: Vec::new(),
+        job: Value::Null,
+        seconds: 0.0,
+    };
+    for (file, outcome) in files.iter().zip(outcomes) {
+        match outcome {
+            Ok(uploaded) => {
+                *report.added.entry(file.class.clone()).or_default() += uploaded.added;
+                report.existing += uploaded.existing;
+            }
+            Err(error) => {
+                let refused = Refused::new(&file.path, error);
+                refused.warn();
+                report.refused.push(refused);
+            }
+        }
+    }
+    let learns = report.refused.is_empty() || (args.keep_going && report.refused.len() < files.len());
+    if learns {
+        report.job = api::reindex(&client, &args.parameters)?;
+    }
+    report.seconds = began.elapsed().as_secs_f64();
+    if json {
+        output::json(&report)?;
+    } else {
+        output::line(&report.text(learns))?;
+    }
+    if report.refused.is_empty() || args.keep_going && learns {
+        Ok(())
+    } else {
+        Err(CliError::Reported)
+    }
+}
+
+fn upload(client: &Client, file: &LabelledFile, poses: Option<usize>) -> Result<api::Uploaded, CliError> {
+    let load = || MeshFile::load(&file.path, Limits::default().max_bytes);
+    match api::upload(client, &file.class, load()?, poses) {
+        Err(CallError::Refused { code, .. }) if poses.is_some() && code == "no_animation" => {
+            Ok(api::upload(client, &file.class, load()?, None)?)
+        }
+        outcome => Ok(outcome?),
+    }
+}
+
+impl Report {
+    fn text(&self, learnt: bool) -> String {
+        let rows: Vec<Vec<String>> = self
+            .added
+            .iter()
+            .map(|(class, added)| vec![class.clone(), added.to_string()])
+            .collect();
+        let mut text = output::table(&["class", ">shapes added"], &rows);
+        if self.existing > 0 {
+            text += &format!("\n{} shapes were there already", self.existing);
+        }
+        if !self.refused.is_empty() {
+            text += &format!("\n{} files were refused, see above", self.refused.len());
+        }
+        if learnt {
+            let relearned = self.job["result"]["relearned"].as_array().map_or(0, Vec::len);
+            let generation = &self.job["generation"];
+            text += &format!(
+                "\n{relearned} classes learnt, index generation {generation}, {:.1} s",
+                self.seconds
+            );
+            for skipped in self.job["result"]["skipped"].as_array().into_iter().flatten() {
+                let name = skipped["class"]["name"].as_str().unwrap_or("?");
+                let reason = skipped["reason"].as_str().unwrap_or("?");
+                text += &format!("\nclass {name} was left out: {reason}");
+            }
+        } else {
+            text += "\nnothing was learnt; mend or remove the refused files, or use --keep-going";
+        }
+        text
+    }
+}

@@ -1,0 +1,177 @@
+//! `shapelex inspect`: what is read of a file, what cleaning did, how its spectrum begins.
+
+use super::files::MeshFile;
+use super::refused::Refused;
+use super::{CliError, ParameterArgs, output};
+use crate::cancel::Cancel;
+use crate::mesh::{Format, Limits, PrepareReport, TriangleSoup, read, read_poses};
+use crate::parameters::Parameters;
+use crate::pipeline::describe_shape;
+use serde::Serialize;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Arguments of `inspect`.
+#[derive(Debug, clap::Args)]
+pub struct InspectArgs {
+    /// Mesh files: OBJ, glTF, GLB, PLY, STL or OFF
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Sample this many poses of an animated glTF and inspect each
+    #[arg(long, value_name = "COUNT")]
+    pub poses: Option<usize>,
+    /// The method's parameters.
+    #[command(flatten)]
+    pub parameters: ParameterArgs,
+}
+
+/// What is known of one mesh.
+#[derive(Debug, Serialize)]
+struct Inspection {
+    file: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pose: Option<String>,
+    format: Format,
+    report: PrepareReport,
+    /// The first eigenvalues, dimensionless, ascending from 0.
+    eigenvalues: Vec<f64>,
+    signatures: usize,
+}
+
+/// Inspects every file; goes on after one that is refused.
+///
+/// # Errors
+/// [`CliError::Reported`] where a file was refused.
+pub fn run(args: &InspectArgs, json: bool) -> Result<(), CliError> {
+    let parameters = args.parameters.parameters()?;
+    let mut refused = false;
+    for path in &args.files {
+        let file = path.display().to_string();
+        let result = MeshFile::load(path, Limits::default().max_bytes)
+            .and_then(|mesh| inspect(&file, &mesh, args.poses, &parameters));
+        match result {
+            Ok(inspections) => {
+                for inspection in inspections {
+                    if json {
+                        output::json(&inspection)?;
+                    } else {
+                        output::line(&inspection.text())?;
+                    }
+                }
+            }
+            Err(error) => {
+                refused = true;
+                let refusal = Refused::new(path, error);
+                refusal.warn();
+                if json {
+                    output::json(&json!({ "file": refusal.file, "error": refusal.reason }))?;
+                }
+            }
+        }
+    }
+    if refused { Err(CliError::Reported) } else { Ok(()) }
+}
+
+fn inspect(
+    file: &str,
+    mesh: &MeshFile,
+    poses: Option<usize>,
+    parameters: &Parameters,
+) -> Result<Vec<Inspection>, CliError> {
+    let limits = Limits::default();
+    let (format, soups): (Format, Vec<(Option<String>, TriangleSoup)>) = match poses {
+        None => {
+            let (format, soup) = read(&mesh.source(), &limits)?;
+            (format, vec![(None, soup)])
+        }
+        Some(count) => {
+            let (format, poses) = read_poses(&mesh.source(), count, &limits)?;
+            (
+                format,
+                poses.into_iter().map(|p| (Some(p.label), p.soup)).collect(),
+            )
+        }
+    };
+    soups
+        .into_iter()
+        .map(|(pose, soup)| {
+            let description = describe_shape(soup, parameters, &Cancel::new(), &|_| ())?;
+            Ok(Inspection {
+                file: file.to_owned(),
+                pose,
+                format,
+                signatures: description.views.first().map_or(0, |v| v.signatures.len()),
+                report: description.report,
+                eigenvalues: description.eigenvalues,
+            })
+        })
+        .collect()
+}
+
+impl Inspection {
+    fn text(&self) -> String {
+        let r = &self.report;
+        let name = match &self.pose {
+            Some(pose) => format!("{} ({pose})", self.file),
+            None => self.file.clone(),
+        };
+        let mut lines = vec![format!("{name}: {}", self.format)];
+        let mut row = |label: &str, value: String| lines.push(format!("  {label:<12} {value}"));
+        row(
+            "read",
+            format!("{} vertices, {} faces", r.input_vertices, r.input_faces),
+        );
+        row("cleaned", cleaned(r));
+        let simplified = r
+            .simplified_from
+            .map(|from| format!(", simplified from {from}"))
+            .unwrap_or_default();
+        row(
+            "prepared",
+            format!("{} vertices, {} faces{simplified}", r.vertices, r.faces),
+        );
+        let boundary = if r.boundary_edges == 0 {
+            "closed".to_owned()
+        } else {
+            format!(
+                "{} boundary edges, boundary length {:.2} √area",
+                r.boundary_edges, r.openness
+            )
+        };
+        row("surface", format!("area {:.6}, {boundary}", r.area));
+        let eigenvalues: Vec<String> = self
+            .eigenvalues
+            .iter()
+            .take(10)
+            .map(|v| format!("{v:.3}"))
+            .collect();
+        row("eigenvalues", format!("{} …", eigenvalues.join(" ")));
+        row("signatures", self.signatures.to_string());
+        for warning in &r.warnings {
+            row("warning", warning.clone());
+        }
+        lines.join("\n")
+    }
+}
+
+/// Only what cleaning did; nothing is the usual case.
+fn cleaned(r: &PrepareReport) -> String {
+    let done: Vec<String> = [
+        (r.welded_vertices, "vertices welded"),
+        (r.degenerate_faces, "degenerate faces dropped"),
+        (r.duplicate_faces, "duplicate faces dropped"),
+        (r.unreferenced_vertices, "unreferenced vertices dropped"),
+        (r.components_dropped, "components dropped"),
+        (r.holes_filled, "holes filled"),
+        (r.non_manifold_edges, "non-manifold edges kept"),
+    ]
+    .iter()
+    .filter(|(count, _)| *count > 0)
+    .map(|(count, what)| format!("{count} {what}"))
+    .collect();
+    if done.is_empty() {
+        "nothing to do".to_owned()
+    } else {
+        done.join(", ")
+    }
+}

@@ -1,0 +1,132 @@
+//! The command line: one file per subcommand, and what they share.
+//!
+//! Answers go to stdout, everything else to stderr. With `--json` an answer is one JSON value per line. Exit codes:
+//! 0 everything was done, 1 something failed or some inputs were refused, 2 the command line or the configuration is
+//! wrong.
+
+mod api;
+mod client;
+pub mod demo;
+mod demo_report;
+mod dictionaries;
+mod error;
+pub mod evaluate;
+mod evaluation_report;
+pub mod export;
+mod files;
+pub mod health;
+pub mod import;
+pub mod index;
+pub mod inspect;
+mod openapi;
+mod output;
+mod parameters;
+mod progress;
+pub mod query;
+mod refused;
+pub mod serve;
+mod service;
+pub mod zoo;
+
+pub use error::CliError;
+pub use parameters::ParameterArgs;
+
+use crate::telemetry::{self, LogFormat};
+use clap::{Parser, Subcommand};
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+/// Recognises deformable 3D shapes
+#[derive(Debug, Parser)]
+#[command(name = "shapelex", version, about, long_about = LONG_ABOUT, after_help = AFTER_HELP)]
+pub struct Cli {
+    /// Answer in JSON, one value per line
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const LONG_ABOUT: &str = "Recognises deformable 3D shapes: learns a dictionary of local signatures per class from \
+example meshes, and ranks the classes a new mesh may belong to.";
+const AFTER_HELP: &str = "Exit codes: 0 done; 1 something failed or some inputs were refused; 2 wrong usage or \
+configuration.";
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run the service
+    Serve(serve::ServeArgs),
+    /// Make a zoo, teach it to a service and recognise unseen poses, over HTTP
+    Demo(demo::DemoArgs),
+    /// Learn the classes of a folder per class
+    Index(index::IndexArgs),
+    /// Rank the classes a mesh may belong to
+    Query(query::QueryArgs),
+    /// Measure accuracy on a folder per class
+    Evaluate(evaluate::EvaluateArgs),
+    /// Show what is read of a file, what cleaning did, how its spectrum begins
+    Inspect(inspect::InspectArgs),
+    /// Write procedural creatures, a folder per class
+    Zoo(zoo::ZooArgs),
+    /// Write the index's dictionaries to a safetensors file
+    Export(export::ExportArgs),
+    /// Make dictionaries of a safetensors file the index of a data directory
+    Import(import::ImportArgs),
+    /// Ask whether a service answers
+    Health(health::HealthArgs),
+    /// Print the API's OpenAPI document
+    Openapi,
+}
+
+/// Parses the arguments, runs the command, prints its error and returns the exit code.
+pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Printing help fails only where nobody reads it.
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() {
+                error::USAGE
+            } else {
+                error::OK
+            });
+        }
+    };
+    match dispatch(&cli) {
+        Ok(()) => ExitCode::from(error::OK),
+        Err(error) => {
+            if let Some(message) = error.message() {
+                eprintln!("{message}");
+            }
+            error.exit_code()
+        }
+    }
+}
+
+fn dispatch(cli: &Cli) -> Result<(), CliError> {
+    let json = cli.json;
+    if !matches!(cli.command, Command::Serve(_)) {
+        quiet_logs()?;
+    }
+    match &cli.command {
+        Command::Serve(args) => serve::run(args, json),
+        Command::Demo(args) => demo::run(args, json),
+        Command::Index(args) => index::run(args, json),
+        Command::Query(args) => query::run(args, json),
+        Command::Evaluate(args) => evaluate::run(args, json),
+        Command::Inspect(args) => inspect::run(args, json),
+        Command::Zoo(args) => zoo::run(args, json),
+        Command::Export(args) => export::run(args, json),
+        Command::Import(args) => import::run(args, json),
+        Command::Health(args) => health::run(args, json),
+        Command::Openapi => openapi::run(json),
+    }
+}
+
+/// Logs of commands other than `serve`: warnings, unless the environment asks for more.
+fn quiet_logs() -> Result<(), CliError> {
+    let filter = std::env::var("SHAPELEX_LOG").unwrap_or_else(|_| "warn".to_owned());
+    telemetry::init(&filter, LogFormat::Text).map_err(|error| CliError::Usage(error.to_string()))
+}

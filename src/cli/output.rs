@@ -1,0 +1,67 @@
+//! Answers on stdout: lines and tables for people, one JSON value per line for machines.
+
+use super::CliError;
+use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use serde::Serialize;
+use std::io::Write;
+
+/// Writes a line to stdout.
+///
+/// # Errors
+/// [`CliError::OutputClosed`] where nobody reads any more.
+pub fn line(text: &str) -> Result<(), CliError> {
+    let mut stdout = std::io::stdout().lock();
+    writeln!(stdout, "{text}")?;
+    stdout.flush()?;
+    Ok(())
+}
+
+/// Writes a value as one line of JSON to stdout.
+///
+/// # Errors
+/// As [`line`].
+pub fn json(value: &impl Serialize) -> Result<(), CliError> {
+    let text = serde_json::to_string(value).map_err(|error| CliError::Failed(error.to_string()))?;
+    line(&text)
+}
+
+/// A table with a header; columns whose header begins with `>` are aligned to the right.
+pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
+    let mut table = Table::new();
+    table
+        .load_preset(presets::UTF8_HORIZONTAL_ONLY)
+        .set_content_arrangement(ContentArrangement::Disabled)
+        .set_header(header.iter().map(|h| h.trim_start_matches('>')));
+    for row in rows {
+        table.add_row(row);
+    }
+    for (i, _) in header.iter().enumerate().filter(|(_, h)| h.starts_with('>')) {
+        if let Some(column) = table.column_mut(i) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_align_and_keep_every_cell() {
+        let text = table(
+            &["class", ">score"],
+            &[
+                vec!["cat".into(), "0.35".into()],
+                vec!["elephant".into(), "10.5".into()],
+            ],
+        );
+        let cat = text.lines().find(|l| l.contains("cat")).unwrap();
+        let elephant = text.lines().find(|l| l.contains("elephant")).unwrap();
+        assert!(
+            cat.trim_end().ends_with("0.35") && elephant.trim_end().ends_with("10.5"),
+            "{text}"
+        );
+        assert!(!text.contains('>'), "{text}");
+    }
+}

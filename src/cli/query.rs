@@ -1,0 +1,178 @@
+//! `shapelex query`: which class a mesh belongs to.
+
+use super::client::{Client, TargetArgs};
+use super::files::MeshFile;
+use super::refused::Refused;
+use super::{CliError, api, dictionaries, output};
+use crate::cancel::Cancel;
+use crate::mesh::{Limits, read};
+use crate::pipeline::{describe_query, rank};
+use crate::ranking::Index;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// Arguments of `query`.
+#[derive(Debug, clap::Args)]
+pub struct QueryArgs {
+    /// Mesh files: OBJ, glTF, GLB, PLY, STL or OFF
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Where the index is.
+    #[command(flatten)]
+    pub target: TargetArgs,
+    /// Query dictionaries written by `export` instead of an index
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["data", "server"])]
+    pub dictionaries: Option<PathBuf>,
+    /// How many classes are shown
+    #[arg(long, value_name = "COUNT", default_value_t = 5)]
+    pub top: usize,
+}
+
+enum Source {
+    Service(Client),
+    File(Index),
+}
+
+/// Ranks every file; goes on after one that is refused. With `--json` one line per file: the API's answer and the
+/// file's path.
+///
+/// # Errors
+/// [`CliError::Reported`] where a file was refused; [`CliError::Failed`] where there is nothing to query.
+pub fn run(args: &QueryArgs, json: bool) -> Result<(), CliError> {
+    let source = match &args.dictionaries {
+        Some(path) => Source::File(dictionaries::load(path)?.index),
+        None => Source::Service(args.target.client()?),
+    };
+    let mut refused = false;
+    for path in &args.files {
+        match source.rank(path, args.top) {
+            Ok(mut answer) => {
+                if json {
+                    answer["file"] = json!(path.display().to_string());
+                    output::json(&answer)?;
+                } else {
+                    output::line(&text(path, &answer))?;
+                }
+            }
+            Err(error) => {
+                refused = true;
+                let refusal = Refused::new(path, error);
+                refusal.warn();
+                if json {
+                    output::json(&json!({ "file": refusal.file, "error": refusal.reason }))?;
+                }
+            }
+        }
+    }
+    if refused { Err(CliError::Reported) } else { Ok(()) }
+}
+
+impl Source {
+    fn rank(&self, path: &Path, top: usize) -> Result<Value, CliError> {
+        let limits = Limits::default();
+        let file = MeshFile::load(path, limits.max_bytes)?;
+        let mut answer = match self {
+            Self::Service(client) => api::query(client, file)?,
+            Self::File(index) => rank_against(index, &file, &limits)?,
+        };
+        if let Some(classes) = answer["classes"].as_array_mut() {
+            classes.truncate(top);
+        }
+        Ok(answer)
+    }
+}
+
+/// The same stages as the service's query, on an index that came out of a file. The answer has the members of the
+/// API's answer that have a meaning without a service.
+fn rank_against(index: &Index, file: &MeshFile, limits: &Limits) -> Result<Value, CliError> {
+    let cancel = Cancel::new();
+    let (format, soup) = read(&file.source(), limits)?;
+    let description = describe_query(soup, &index.parameters, &cancel, &|_| ())?;
+    let ranking = rank(&description.views, index, index.parameters.rank_by, &cancel)
+        .map_err(crate::pipeline::PipelineError::from)?;
+    let classes: Vec<Value> = ranking
+        .classes
+        .iter()
+        .enumerate()
+        .map(|(i, c)| {
+            json!({
+                "rank": i + 1,
+                "class": { "name": c.label },
+                "score": c.score,
+                "reconstruction_error": c.frobenius_error,
+                "relative_error": c.relative_error,
+                "mean_objective": c.mean_objective,
+                "trimmed_objective": c.trimmed_objective,
+                "mean_nonzeros": c.mean_nonzeros,
+                "hypothesis": c.hypothesis,
+                "margin": c.margin,
+            })
+        })
+        .collect();
+    Ok(json!({
+        "name": file.name,
+        "classes": classes,
+        "confidence": ranking.confidence,
+        "compared": ranking.classes.len(),
+        "signatures": ranking.signatures,
+        "format": format,
+        "warnings": description.report.warnings,
+        "mesh": description.report,
+        "eigenvalues": description.eigenvalues,
+        "rank_by": index.parameters.rank_by,
+        "parameters": index.parameters,
+    }))
+}
+
+#[derive(Deserialize)]
+struct Row {
+    rank: usize,
+    class: RowClass,
+    score: f64,
+    relative_error: f64,
+    mean_nonzeros: f64,
+    margin: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct RowClass {
+    name: String,
+}
+
+/// The ranked table of one answer.
+pub fn text(path: &Path, answer: &Value) -> String {
+    let rows: Vec<Vec<String>> = answer["classes"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(|row| Row::deserialize(row).ok())
+        .map(|row| {
+            vec![
+                row.rank.to_string(),
+                row.class.name,
+                format!("{:.5}", row.score),
+                format!("{:.4}", row.relative_error),
+                format!("{:.2}", row.mean_nonzeros),
+                row.margin
+                    .map_or(String::new(), |m| format!("{:.2} %", 100.0 * m)),
+            ]
+        })
+        .collect();
+    let mut text = format!("{}\n", path.display());
+    text += &output::table(
+        &[
+            ">rank",
+            "class",
+            ">score",
+            ">relative error",
+            ">non-zeros",
+            ">margin to next",
+        ],
+        &rows,
+    );
+    for warning in answer["warnings"].as_array().into_iter().flatten() {
+        text += &format!("\nwarning: {}", warning.as_str().unwrap_or_default());
+    }
+    text
+}

@@ -1,0 +1,66 @@
+//! Starting and ending the service, for `serve` and for `demo`.
+
+use super::CliError;
+use crate::http::{AppState, ServiceConfig, serve};
+use std::future::Future;
+use std::net::SocketAddr;
+use tokio::net::TcpListener;
+
+/// Serves until `shutdown` resolves. `listening` is told the address once connections are accepted.
+///
+/// # Errors
+/// [`CliError::Failed`] where the data directory cannot be opened, the address cannot be bound or serving fails.
+pub fn run_until(
+    config: ServiceConfig,
+    shutdown: impl Future<Output = ()> + Send + 'static,
+    listening: impl FnOnce(SocketAddr) -> Result<(), CliError>,
+) -> Result<(), CliError> {
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+    let outcome = runtime.block_on(async {
+        let address = config.listen;
+        // The address first: opening a large data directory takes a while, a taken port should say so at once.
+        let listener = TcpListener::bind(address)
+            .await
+            .map_err(|error| CliError::Failed(format!("cannot listen on {address}: {error}")))?;
+        let state = tokio::task::spawn_blocking(move || AppState::open(config))
+            .await
+            .map_err(|error| CliError::Failed(format!("the service did not start: {error}")))?
+            .map_err(|error| CliError::Failed(error.to_string()))?;
+        listening(listener.local_addr()?)?;
+        serve(state, listener, shutdown)
+            .await
+            .map_err(|error| CliError::Failed(error.to_string()))
+    });
+    // Whatever still computes has been asked to stop and given its time; it must not hold the process back.
+    runtime.shutdown_background();
+    outcome
+}
+
+/// Resolves at the first SIGINT or SIGTERM. A second one ends the process at once.
+pub async fn interrupted() {
+    signal().await;
+    tokio::spawn(async {
+        signal().await;
+        std::process::exit(130);
+    });
+}
+
+#[cfg(unix)]
+async fn signal() {
+    use tokio::signal::unix::{SignalKind, signal};
+    let Ok(mut terminate) = signal(SignalKind::terminate()) else {
+        // Without a handler the signal ends the process by itself.
+        return std::future::pending().await;
+    };
+    tokio::select! {
+        _ = tokio::signal::ctrl_c() => {}
+        _ = terminate.recv() => {}
+    }
+}
+
+#[cfg(not(unix))]
+async fn signal() {
+    if tokio::signal::ctrl_c().await.is_err() {
+        std::future::pending().await
+    }
+}

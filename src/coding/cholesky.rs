@@ -1,0 +1,112 @@
+//! A Cholesky factor that grows and shrinks by one row: the Gram matrix of an active set.
+
+/// The smallest pivot, relative to the new atom's squared norm, with which an atom still counts as independent of
+/// the set. Rounding leaves about 1e-14 where an atom is an exact combination of the others.
+const DEPENDENT: f64 = 1e-12;
+
+/// Lower factor F of a symmetric positive definite matrix, G = F Fᵀ, by packed rows: row i has i + 1 entries, so all
+/// loops run over adjacent memory.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Factor {
+    rows: Vec<f64>,
+    inverse_diagonal: Vec<f64>,
+    /// Cosines and sines of the rotations of the deletion under way, by column.
+    rotations: Vec<(f64, f64)>,
+}
+
+fn start(row: usize) -> usize {
+    row * (row + 1) / 2
+}
+
+pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (x8, y8) = (x.chunks_exact(8), y.chunks_exact(8));
+    let mut tail = 0.0;
+    for (a, b) in x8.remainder().iter().zip(y8.remainder()) {
+        tail += a * b;
+    }
+    for (a, b) in x8.zip(y8) {
+        for k in 0..8 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    let [a, b, c, d, e, f, g, h] = sums;
+    ((a + b) + (c + d)) + ((e + f) + (g + h)) + tail
+}
+
+impl Factor {
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.inverse_diagonal.len()
+    }
+
+    /// Forgets all rows, keeps the memory.
+    pub fn clear(&mut self) {
+        self.rows.clear();
+        self.inverse_diagonal.clear();
+    }
+
+    /// Appends a row: `column` holds the new row of G up to, not including, its diagonal, and is overwritten by the
+    /// new row of F. False, and nothing changed but `column`, where the new row depends on the others.
+    pub fn push(&mut self, column: &mut [f64], diagonal: f64) -> bool {
+        self.solve_lower(column);
+        let pivot = diagonal - dot(column, column);
+        if pivot.is_nan() || pivot <= DEPENDENT * diagonal {
+            return false;
+        }
+        let root = pivot.sqrt();
+        self.rows.extend_from_slice(column);
+        self.rows.push(root);
+        self.inverse_diagonal.push(root.recip());
+        true
+    }
+
+    /// Deletes row and column `k` of G, by Givens rotations: O((len − k)²).
+    pub fn remove(&mut self, k: usize) {
+        let len = self.len();
+        self.rotations.clear();
+        // The rows below lose column k of G; each keeps one entry too many, which rotations of neighbouring columns
+        // carry to the right and out. Row i goes to row i − 1, which starts i entries earlier.
+        for i in k + 1..len {
+            let (from, to) = (start(i), start(i - 1));
+            let mut carried = self.rows[from + k];
+            self.rows.copy_within(from..from + k, to);
+            for j in k..i - 1 {
+                // The rotation that was fixed when row j + 1 of the old factor came by.
+                let (c, s) = self.rotations[j - k];
+                let next = self.rows[from + j + 1];
+                self.rows[to + j] = c * carried + s * next;
+                carried = c * next - s * carried;
+            }
+            let next = self.rows[from + i];
+            let root = carried.hypot(next);
+            self.rows[to + i - 1] = root;
+            self.inverse_diagonal[i - 1] = root.recip();
+            self.rotations.push((carried / root, next / root));
+        }
+        self.rows.truncate(start(len - 1));
+        self.inverse_diagonal.truncate(len - 1);
+    }
+
+    /// x ← F⁻¹ x.
+    pub fn solve_lower(&self, x: &mut [f64]) {
+        for i in 0..x.len() {
+            let (done, rest) = x.split_at_mut(i);
+            let row = &self.rows[start(i)..start(i) + i];
+            rest[0] = (rest[0] - dot(row, done)) * self.inverse_diagonal[i];
+        }
+    }
+
+    /// x ← F⁻ᵀ x.
+    pub fn solve_upper(&self, x: &mut [f64]) {
+        for i in (0..x.len()).rev() {
+            let (before, rest) = x.split_at_mut(i);
+            let value = rest[0] * self.inverse_diagonal[i];
+            rest[0] = value;
+            let row = &self.rows[start(i)..start(i) + i];
+            for (b, r) in before.iter_mut().zip(row) {
+                *b -= value * r;
+            }
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! Configuration of the service: flags, then environment, then a TOML file, then defaults.
+//!
+//! One struct, [`Settings`], is both what clap reads and what the file holds, so a setting has one name in three
+//! spellings: `--query-timeout-seconds`, `SHAPELEX_QUERY_TIMEOUT_SECONDS`, `query_timeout_seconds = 60`. The table in
+//! `docs/configuration.md` is checked against it by a test.
+
+use crate::http::ServiceConfig;
+use crate::mesh::Limits;
+use crate::parameters::Preset;
+use crate::store::StoreOptions;
+use crate::telemetry::LogFormat;
+use serde::{Deserialize, Serialize};
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Where the service and the local commands keep their data, unless told otherwise.
+pub const DEFAULT_DATA: &str = "shapelex-data";
+/// Where the service listens, and where clients look for it, unless told otherwise.
+pub const DEFAULT_LISTEN: SocketAddr =
+    SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 7345);
+
+/// The configuration file or a setting is wrong.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("configuration file {path}: {reason}")]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The file is not TOML, or a key or value is not known.
+    #[error("configuration file {path}: {reason}")]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// Where and why.
+        reason: String,
+    },
+    /// A value is outside its range.
+    #[error("{name} must be {expected}, got {found}")]
+    OutOfRange {
+        /// The setting, as the file spells it.
+        name: &'static str,
+        /// What it may be.
+        expected: &'static str,
+        /// What it was.
+        found: String,
+    },
+}
+
+macro_rules! settings {
+    ($($(#[doc = $help:literal])+ $field:ident : $type:ty = $default:expr, $env:literal, $value:literal $(, $parser:path)?;)*) => {
+        /// Settings of one source; `None` where it is silent.
+        #[derive(Clone, Debug, Default, PartialEq, clap::Args, Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        #[command(next_help_heading = "Settings")]
+        pub struct Settings {
+            $($(#[doc = $help])+ #[arg(long, env = $env, value_name = $value $(, value_parser = $parser)?)] pub $field: Option<$type>,)*
+        }
+
+        /// The configuration in force.
+        #[derive(Clone, Debug, PartialEq, Serialize)]
+        pub struct Config {
+            $($(#[doc = $help])+ pub $field: $type,)*
+        }
+
+        impl Default for Config {
+            fn default() -> Self {
+                Self { $($field: $default,)* }
+            }
+        }
+
+        impl Settings {
+            /// These settings, and where they are silent those of a weaker source.
+            #[must_use]
+            pub fn or(self, weaker: Self) -> Self {
+                Self { $($field: self.$field.or(weaker.$field),)* }
+            }
+
+            /// These settings, and where they are silent the defaults.
+            ///
+            /// # Errors
+            /// [`ConfigError::OutOfRange`] where a value makes no sense.
+            pub fn resolve(self) -> Result<Config, ConfigError> {
+                let default = Config::default();
+                let config = Config { $($field: self.$field.unwrap_or(default.$field),)* };
+                config.validate()?;
+                Ok(config)
+            }
+        }
+    };
+}
+
+settings! {
+    /// Directory that holds everything the service must not forget
+    data: PathBuf = PathBuf::from(DEFAULT_DATA), "SHAPELEX_DATA", "DIR";
+    /// Address and port to listen on; port 0 takes a free one and says which
+    listen: SocketAddr = DEFAULT_LISTEN, "SHAPELEX_LISTEN", "ADDRESS";
+    /// Log level (error, warn, info, debug, trace, off), or a list of target=level
+    log: String = "info".to_owned(), "SHAPELEX_LOG", "FILTER";
+    /// How log lines are written
+    log_format: LogFormat = LogFormat::Text, "SHAPELEX_LOG_FORMAT", "FORMAT";
+    /// Preset the first reindex starts from, where it names none
+    preset: Preset = Preset::Default, "SHAPELEX_PRESET", "PRESET", parse_preset;
+    /// Longest request body, in MiB
+    max_body_mib: usize = 128, "SHAPELEX_MAX_BODY_MIB", "MIB";
+    /// Files in one upload, or members of its archive, at most
+    max_upload_files: usize = 2048, "SHAPELEX_MAX_UPLOAD_FILES", "COUNT";
+    /// Size of an archive's members once unpacked, at most, in MiB
+    max_unpacked_mib: usize = 256, "SHAPELEX_MAX_UNPACKED_MIB", "MIB";
+    /// Vertices of one mesh, at most
+    max_vertices: usize = 2_000_000, "SHAPELEX_MAX_VERTICES", "COUNT";
+    /// Triangles of one mesh, at most
+    max_faces: usize = 4_000_000, "SHAPELEX_MAX_FACES", "COUNT";
+    /// Poses sampled from one animated file, at most
+    max_poses: usize = 64, "SHAPELEX_MAX_POSES", "COUNT";
+    /// Threads that answer queries; 0 takes one per core
+    query_threads: usize = 0, "SHAPELEX_QUERY_THREADS", "COUNT";
+    /// Queries that may wait for a thread before more are refused
+    query_queue: usize = 64, "SHAPELEX_QUERY_QUEUE", "COUNT";
+    /// Time a query waits for a thread before it is refused, in seconds
+    query_wait_seconds: u64 = 10, "SHAPELEX_QUERY_WAIT_SECONDS", "SECONDS";
+    /// Time a query may compute before it is stopped, in seconds
+    query_timeout_seconds: u64 = 60, "SHAPELEX_QUERY_TIMEOUT_SECONDS", "SECONDS";
+    /// Time a request's body may take to arrive, in seconds
+    upload_timeout_seconds: u64 = 120, "SHAPELEX_UPLOAD_TIMEOUT_SECONDS", "SECONDS";
+    /// Threads that learn dictionaries in the background; 0 leaves one core to queries
+    indexing_threads: usize = 0, "SHAPELEX_INDEXING_THREADS", "COUNT";
+    /// Jobs that may wait before more are refused
+    job_queue: usize = 1000, "SHAPELEX_JOB_QUEUE", "COUNT";
+    /// Time running requests get to finish at shutdown, in seconds
+    shutdown_timeout_seconds: u64 = 10, "SHAPELEX_SHUTDOWN_TIMEOUT_SECONDS", "SECONDS";
+    /// Page cache of the key-value store, in MiB
+    cache_mib: u64 = 64, "SHAPELEX_CACHE_MIB", "MIB";
+}
+
+impl Settings {
+    /// Reads a TOML file.
+    ///
+    /// # Errors
+    /// [`ConfigError::Unreadable`] or [`ConfigError::Invalid`], with the place in the file.
+    pub fn from_file(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path).map_err(|error| ConfigError::Unreadable {
+            path: path.to_owned(),
+            reason: error.to_string(),
+        })?;
+        toml::from_str(&text).map_err(|error| ConfigError::Invalid {
+            path: path.to_owned(),
+            reason: one_line(&error, &text),
+        })
+    }
+}
+
+/// A preset by its name.
+///
+/// # Errors
+/// A sentence with the names there are.
+pub fn parse_preset(text: &str) -> Result<Preset, String> {
+    serde_json::from_value(serde_json::Value::String(text.to_owned()))
+        .map_err(|_| "expected default, paper or robust".to_owned())
+}
+
+/// The parser's message with the line it is about, on one line.
+fn one_line(error: &toml::de::Error, text: &str) -> String {
+    let message = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
+    match error.span() {
+        Some(span) => {
+            let line = text.bytes().take(span.start).filter(|&b| b == b'\n').count() + 1;
+            format!("line {line}: {message}")
+        }
+        None => message,
+    }
+}
+
+impl Config {
+    fn validate(&self) -> Result<(), ConfigError> {
+        let at_least_one: [(&'static str, u64); 12] = [
+            ("max_body_mib", self.max_body_mib as u64),
+            ("max_upload_files", self.max_upload_files as u64),
+            ("max_unpacked_mib", self.max_unpacked_mib as u64),
+            ("max_vertices", self.max_vertices as u64),
+            ("max_faces", self.max_faces as u64),
+            ("max_poses", self.max_poses as u64),
+            ("query_queue", self.query_queue as u64),
+            ("query_wait_seconds", self.query_wait_seconds),
+            ("query_timeout_seconds", self.query_timeout_seconds),
+            ("upload_timeout_seconds", self.upload_timeout_seconds),
+            ("job_queue", self.job_queue as u64),
+            ("cache_mib", self.cache_mib),
+        ];
+        match at_least_one.iter().find(|(_, value)| *value == 0) {
+            Some(&(name, value)) => Err(ConfigError::OutOfRange {
+                name,
+                expected: "1 or more",
+                found: value.to_string(),
+            }),
+            None => Ok(()),
+        }
+    }
+
+    /// The same in the service's own units.
+    pub fn service(&self) -> ServiceConfig {
+        let default = ServiceConfig::default();
+        let or_default = |threads: usize, default: usize| if threads == 0 { default } else { threads };
+        ServiceConfig {
+            listen: self.listen,
+            data_dir: self.data.clone(),
+            store: StoreOptions {
+                cache_bytes: self.cache_mib << 20,
+            },
+            max_body_bytes: self.max_body_mib << 20,
+            max_upload_files: self.max_upload_files,
+            max_unpacked_bytes: self.max_unpacked_mib << 20,
+            limits: Limits {
+                max_vertices: self.max_vertices,
+                max_faces: self.max_faces,
+                max_poses: self.max_poses,
+                ..Limits::default()
+            },
+            query_threads: or_default(self.query_threads, default.query_threads),
+            query_queue: self.query_queue,
+            query_wait: Duration::from_secs(self.query_wait_seconds),
+            query_timeout: Duration::from_secs(self.query_timeout_seconds),
+            upload_timeout: Duration::from_secs(self.upload_timeout_seconds),
+            indexing_threads: or_default(self.indexing_threads, default.indexing_threads),
+            job_queue: self.job_queue,
+            preset: self.preset,
+            shutdown_timeout: Duration::from_secs(self.shutdown_timeout_seconds),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn file(text: &str) -> tempfile::NamedTempFile {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(text.as_bytes()).unwrap();
+        file
+    }
+
+    #[test]
+    fn flags_win_over_the_file_and_the_file_over_defaults() {
+        let file = file("listen = \"0.0.0.0:80\"\njob_queue = 7\nlog_format = \"json\"\n");
+        let flags = Settings {
+            job_queue: Some(9),
+            ..Settings::default()
+        };
+        let config = flags
+            .or(Settings::from_file(file.path()).unwrap())
+            .resolve()
+            .unwrap();
+        assert_eq!(config.job_queue, 9);
+        assert_eq!(config.listen, "0.0.0.0:80".parse().unwrap());
+        assert_eq!(config.log_format, LogFormat::Json);
+        assert_eq!(config.data, Path::new(DEFAULT_DATA));
+    }
+
+    #[test]
+    fn a_wrong_file_is_refused_with_the_line_and_the_key() {
+        let unknown = file("job_queue = 7\n\nport = 80\n");
+        let error = Settings::from_file(unknown.path()).unwrap_err().to_string();
+        assert!(error.contains("line 3") && error.contains("port"), "{error}");
+        assert!(error.contains("listen"), "names what there is: {error}");
+        let kind = file("job_queue = \"many\"\n");
+        let error = Settings::from_file(kind.path()).unwrap_err().to_string();
+        assert!(error.contains("line 1") && !error.contains('\n'), "{error}");
+        assert!(Settings::from_file(Path::new("/nowhere/shapelex.toml")).is_err());
+    }
+
+    #[test]
+    fn zeros_that_would_refuse_everything_are_refused() {
+        let settings = Settings {
+            max_vertices: Some(0),
+            ..Settings::default()
+        };
+        let error = settings.resolve().unwrap_err().to_string();
+        assert_eq!(error, "max_vertices must be 1 or more, got 0");
+    }
+}

@@ -1,0 +1,79 @@
+//! Logs: to stderr, as text for people or as one JSON object per line for machines.
+
+use serde::{Deserialize, Serialize};
+use std::io::IsTerminal;
+use tracing_subscriber::EnvFilter;
+
+/// How log lines are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum LogFormat {
+    /// One readable line per event.
+    #[default]
+    Text,
+    /// One JSON object per event.
+    Json,
+}
+
+/// Logging could not be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum TelemetryError {
+    /// The filter is not understood.
+    #[error("'{filter}' is no log filter ({reason}); use a level such as info, or info,shapelex=debug")]
+    Filter {
+        /// What was given.
+        filter: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The process has a subscriber already.
+    #[error("logging was set up twice")]
+    AlreadySet,
+}
+
+/// Installs the process's log output. `filter` is a level (`error`, `warn`, `info`, `debug`, `trace`, `off`) or a list
+/// of `target=level`.
+///
+/// # Errors
+/// [`TelemetryError::Filter`] for a filter that cannot be read; [`TelemetryError::AlreadySet`] on a second call.
+pub fn init(filter: &str, format: LogFormat) -> Result<(), TelemetryError> {
+    let filter = parse(filter)?;
+    let builder = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal());
+    match format {
+        LogFormat::Text => builder.try_init(),
+        LogFormat::Json => builder.json().flatten_event(true).try_init(),
+    }
+    .map_err(|_| TelemetryError::AlreadySet)
+}
+
+/// A bare level filters everything that is ours and the warnings of everybody else.
+fn parse(filter: &str) -> Result<EnvFilter, TelemetryError> {
+    let bare = filter.parse::<tracing_subscriber::filter::LevelFilter>();
+    let directives = match bare {
+        Ok(level) if level > tracing_subscriber::filter::LevelFilter::WARN => {
+            format!("warn,shapelex={filter},tower_http={filter}")
+        }
+        _ => filter.to_owned(),
+    };
+    EnvFilter::try_new(directives).map_err(|error| TelemetryError::Filter {
+        filter: filter.to_owned(),
+        reason: error.to_string(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_and_directives_are_filters_and_other_text_is_not() {
+        for good in ["info", "off", "shapelex=debug,warn", "TRACE"] {
+            assert!(parse(good).is_ok(), "{good}");
+        }
+        let error = parse("shapelex=loud").unwrap_err();
+        assert!(error.to_string().contains("shapelex=loud"), "{error}");
+    }
+}

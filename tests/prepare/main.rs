@@ -1,0 +1,8 @@
+//! Soup → clean mesh, and the mesh transforms of the hypotheses, on procedural, hostile, golden and real input.
+
+mod cleaning;
+mod hostile;
+mod hypotheses;
+mod real;
+mod shapes;
+mod simplification;

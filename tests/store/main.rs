@@ -1,0 +1,31 @@
+//! The store and the job queue: durability, recovery, faults at every write, and the indexing worker.
+#![cfg(feature = "service")]
+
+mod catalogue;
+mod faults;
+mod jobs;
+mod recovery;
+
+use bytes::Bytes;
+use shapelex::mesh::{Format, PrepareReport};
+use shapelex::model::{ClassName, NewShape, ShapePose};
+
+/// A shape with contents of the test's choice; the store never looks into them.
+pub fn shape(contents: &str, pose: Option<usize>) -> NewShape {
+    NewShape {
+        name: Some(format!("{contents}.obj")),
+        bytes: Bytes::copy_from_slice(contents.as_bytes()),
+        companions: Vec::new(),
+        format: Format::Obj,
+        pose: pose.map(|index| ShapePose {
+            label: format!("Walk@{index}"),
+            index,
+            of: 8,
+        }),
+        report: PrepareReport::default(),
+    }
+}
+
+pub fn name(text: &str) -> ClassName {
+    ClassName::new(text).unwrap()
+}
