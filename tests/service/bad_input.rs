@@ -1,7 +1,7 @@
 //! Everything that can be wrong with a request has its own problem, and the service goes on.
 
 use crate::harness::{App, multipart};
-use crate::meshes::{mesh, off};
+use crate::meshes::{dense, mesh, off};
 use axum::body::Body;
 use axum::http::Request;
 use serde_json::json;
@@ -218,6 +218,9 @@ async fn what_is_unknown_is_said_to_be() {
     app.post("/v1/query", "model/off", off("bean", 0))
         .await
         .fails(409, "index_empty");
+    app.json("POST", "/v1/reindex", json!({}))
+        .await
+        .fails(409, "nothing_to_index");
     app.get("/v1/jobs/7").await.fails(404, "job_not_found");
     app.get("/v1/jobs/7/events").await.fails(404, "job_not_found");
     app.get("/v2/classes").await.fails(404, "route_not_found");
@@ -295,7 +298,8 @@ async fn json_bodies_are_checked_to_the_last_field() {
             422,
             "invalid_parameter",
         ),
-        ("/v1/reindex", r#"[]"#, 422, "invalid_field"),
+        ("/v1/reindex", "[]", 422, "invalid_field"),
+        ("/v1/reindex", r#"{"parameters": []}"#, 422, "invalid_field"),
     ] {
         let answer = app.post(path, "application/json", body).await;
         assert_eq!(
@@ -352,13 +356,9 @@ async fn forms_without_a_mesh_or_with_two_are_told_so() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_query_past_its_deadline_is_stopped() {
-    let app = App::indexed().await;
-    let mut config = app.state.config.clone();
-    config.query_timeout = std::time::Duration::ZERO;
-    drop(config);
-    let late = App::with(|c| c.query_timeout = std::time::Duration::from_nanos(1));
+    let late = App::with(|c| c.query_timeout = std::time::Duration::from_millis(1));
     let answer = late
-        .post("/v1/classes/bean/shapes?create=true", "model/off", off("bean", 0))
+        .post("/v1/classes/bean/shapes?create=true", "model/off", dense().off())
         .await;
     let problem = answer.fails(504, "deadline_exceeded");
     assert!(problem["limit_seconds"].is_number());

@@ -85,3 +85,22 @@ async fn the_service_serves_its_own_document() {
     assert!(yaml.text().starts_with("openapi: 3.1"));
     assert_eq!(app.get("/openapi.json").await.value(), document());
 }
+
+#[test]
+fn the_manual_lists_every_problem() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/api.md");
+    let manual = std::fs::read_to_string(path).unwrap();
+    let listed: Vec<&str> = manual
+        .lines()
+        .filter(|l| l.starts_with("| `") && l.matches('|').count() == 4)
+        .collect();
+    for code in shapelex::http::problem::Code::ALL {
+        let line = format!(
+            "| `{}` | {} | {} |",
+            code.name(),
+            code.status().as_u16(),
+            code.title()
+        );
+        assert!(listed.contains(&line.as_str()), "docs/api.md lacks: {line}");
+    }
+}

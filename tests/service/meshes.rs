@@ -13,7 +13,10 @@ pub struct Mesh {
 
 /// A surface of a class. A pose bends and turns it; `finer` changes the triangulation too.
 pub fn mesh(class: &str, pose: u32) -> Mesh {
-    let (rings, slices) = (22 + pose as usize % 3, 26);
+    surface(class, pose, 22 + pose as usize % 3, 26)
+}
+
+fn surface(class: &str, pose: u32, rings: usize, slices: usize) -> Mesh {
     let mut vertices = vec![[0.0, 0.0, 1.0]];
     for ring in 1..rings {
         let polar = std::f64::consts::PI * ring as f64 / rings as f64;
@@ -56,6 +59,11 @@ pub fn mesh(class: &str, pose: u32) -> Mesh {
         );
     }
     Mesh { vertices, faces }
+}
+
+/// A ball of 100 000 vertices: some work to read and to simplify.
+pub fn dense() -> Mesh {
+    surface("bean", 0, 250, 400)
 }
 
 pub fn off(class: &str, pose: u32) -> Vec<u8> {
