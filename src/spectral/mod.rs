@@ -1,9 +1,23 @@
 //! Mesh → cotangent stiffness and lumped mass → smallest eigenpairs.
 
+pub mod doubled;
 pub mod eigen;
 pub mod error;
 pub mod laplacian;
+pub mod mollify;
 
+mod basis;
+mod block_qr;
+mod dense;
+mod lanczos;
+mod loss;
+mod normalised;
+mod residual;
+mod shift_invert;
+mod simd;
+mod solve;
+
+pub use doubled::{dirichlet_eigenpairs, doubled_eigenpairs};
 pub use eigen::{EigenOptions, Eigenpairs, smallest_eigenpairs};
 pub use error::SpectralError;
 pub use laplacian::{Operators, assemble};

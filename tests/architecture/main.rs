@@ -158,7 +158,9 @@ fn the_reader_of_imports_sees_all_of_them() {
                 crate::jobs::Job;\nuse other_crate::ignored;";
     assert_eq!(used_modules(code), ["mesh", "store", "http", "cli", "jobs"]);
     assert_eq!(
-        used_modules(&production("// crate::http\nfn f() {}\n#[cfg(test)]\nmod tests { use crate::cli; }")),
+        used_modules(&production(
+            "// crate::http\nfn f() {}\n#[cfg(test)]\nmod tests { use crate::cli; }"
+        )),
         [""; 0]
     );
 }

@@ -33,7 +33,11 @@ fn help_and_version_succeed_and_wrong_usage_is_2() {
         assert!(output.stdout.is_empty(), "{args:?}");
         assert!(!output.stderr.is_empty(), "{args:?}");
     }
-    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0, "nothing was made");
+    assert_eq!(
+        std::fs::read_dir(dir.path()).unwrap().count(),
+        0,
+        "nothing was made"
+    );
 }
 
 #[test]
@@ -43,13 +47,20 @@ fn an_unknown_parameter_is_answered_with_those_there_are() {
     let message = stderr(&output);
     assert_eq!(message.lines().count(), 1, "{message}");
     assert!(message.starts_with("shapelex: --set atom"), "{message}");
-    assert!(message.contains("atoms") && message.contains("lambda"), "{message}");
+    assert!(
+        message.contains("atoms") && message.contains("lambda"),
+        "{message}"
+    );
 }
 
 #[test]
 fn inspect_reads_cleans_and_goes_on_after_a_bad_file() {
     let golden = repository("tests/data/bumpy_closed.off");
-    let golden = if golden.exists() { golden } else { repository("../shared/golden/bumpy_closed.off") };
+    let golden = if golden.exists() {
+        golden
+    } else {
+        repository("../shared/golden/bumpy_closed.off")
+    };
     if !golden.exists() {
         eprintln!("skipped: inspect_reads_cleans_and_goes_on_after_a_bad_file: no bumpy_closed.off");
         return;
@@ -60,7 +71,15 @@ fn inspect_reads_cleans_and_goes_on_after_a_bad_file() {
     std::fs::copy(&golden, dir.path().join("good.off")).unwrap();
     let output = run(
         dir.path(),
-        &["inspect", "--json", "bad.obj", "missing.obj", "good.off", "--set", "eigenpairs=60"],
+        &[
+            "inspect",
+            "--json",
+            "bad.obj",
+            "missing.obj",
+            "good.off",
+            "--set",
+            "eigenpairs=60",
+        ],
     );
     assert_eq!(output.status.code(), Some(1));
     let lines: Vec<serde_json::Value> = String::from_utf8(output.stdout.clone())
@@ -69,16 +88,26 @@ fn inspect_reads_cleans_and_goes_on_after_a_bad_file() {
         .map(|l| serde_json::from_str(l).unwrap())
         .collect();
     assert_eq!(lines.len(), 3);
-    assert!(lines[0]["error"].as_str().unwrap().contains("vertex"), "{}", lines[0]);
+    assert!(
+        lines[0]["error"].as_str().unwrap().contains("vertex"),
+        "{}",
+        lines[0]
+    );
     assert_eq!(lines[1]["file"], "missing.obj");
     assert_eq!(lines[2]["format"], "off");
     let eigenvalues = lines[2]["eigenvalues"].as_array().unwrap();
     assert!(eigenvalues[0].as_f64().unwrap().abs() < 1e-6 && eigenvalues[1].as_f64().unwrap() > 1.0);
     let message = stderr(&output);
-    assert!(message.contains("shapelex: bad.obj: ") && message.contains("shapelex: missing.obj: "), "{message}");
+    assert!(
+        message.contains("shapelex: bad.obj: ") && message.contains("shapelex: missing.obj: "),
+        "{message}"
+    );
 
     let text = answer(dir.path(), &["inspect", "good.off", "--set", "eigenpairs=60"]);
-    assert!(text.contains("good.off: OFF") && text.contains("closed"), "{text}");
+    assert!(
+        text.contains("good.off: OFF") && text.contains("closed"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -92,10 +121,29 @@ fn the_zoo_is_written_twice_alike() {
     collect(&dir.path().join("a"), &mut files);
     assert_eq!(files.len(), 4);
     for file in files {
-        let twin = dir.path().join("b").join(file.strip_prefix(dir.path().join("a")).unwrap());
-        assert!(std::fs::read(&file).unwrap() == std::fs::read(twin).unwrap(), "{file:?}");
+        let twin = dir
+            .path()
+            .join("b")
+            .join(file.strip_prefix(dir.path().join("a")).unwrap());
+        assert!(
+            std::fs::read(&file).unwrap() == std::fs::read(twin).unwrap(),
+            "{file:?}"
+        );
     }
-    answer(dir.path(), &["zoo", "--out", "c", "--classes", "1", "--poses", "1", "--format", "glb"]);
+    answer(
+        dir.path(),
+        &[
+            "zoo",
+            "--out",
+            "c",
+            "--classes",
+            "1",
+            "--poses",
+            "1",
+            "--format",
+            "glb",
+        ],
+    );
     let mut glb = Vec::new();
     collect(&dir.path().join("c"), &mut glb);
     assert_eq!(&std::fs::read(&glb[0]).unwrap()[..4], b"glTF");
@@ -143,12 +191,29 @@ fn evaluate_tells_the_classes_of_a_small_zoo_apart_and_names_refused_files() {
         assert_eq!(counted, protocol["total"].as_u64().unwrap());
     }
 
-    let class = std::fs::read_dir(dir.path().join("shapes")).unwrap().next().unwrap().unwrap();
+    let class = std::fs::read_dir(dir.path().join("shapes"))
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap();
     std::fs::write(class.path().join("zz-broken.obj"), "v 0 0 0\n").unwrap();
-    let output = run(dir.path(), &["evaluate", "shapes", "--protocol", "even-odd", "--set", "atoms=32"]);
+    let output = run(
+        dir.path(),
+        &[
+            "evaluate",
+            "shapes",
+            "--protocol",
+            "even-odd",
+            "--set",
+            "atoms=32",
+        ],
+    );
     let text = String::from_utf8(output.stdout.clone()).unwrap();
     assert_eq!(output.status.code(), Some(1), "{text}");
-    assert!(text.contains("zz-broken.obj") && text.contains("no faces"), "{text}");
+    assert!(
+        text.contains("zz-broken.obj") && text.contains("no faces"),
+        "{text}"
+    );
     assert!(text.contains("even/odd"), "{text}");
     let unknown = run(dir.path(), &["evaluate", "shapes", "--same", "unicorn,pegasus"]);
     assert_eq!(unknown.status.code(), Some(2));
@@ -175,5 +240,9 @@ fn a_reader_that_leaves_is_no_failure() {
         .unwrap();
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
-    assert!(output.status.success() && output.stderr.is_empty(), "{}", stderr(&output));
+    assert!(
+        output.status.success() && output.stderr.is_empty(),
+        "{}",
+        stderr(&output)
+    );
 }

@@ -44,7 +44,11 @@ fn the_documented_table_is_the_programs_own() {
     let table = table();
     assert!(table.lines().count() > 15, "{table}");
     if std::env::var_os("SHAPELEX_UPDATE_DOCS").is_some() {
-        std::fs::write(&path, format!("{}{table}{}", &document[..begin], &document[end..])).unwrap();
+        std::fs::write(
+            &path,
+            format!("{}{table}{}", &document[..begin], &document[end..]),
+        )
+        .unwrap();
         return;
     }
     assert_eq!(
@@ -66,7 +70,10 @@ fn every_setting_has_the_same_name_in_all_three_spellings() {
     let serve = cli.find_subcommand("serve").unwrap();
     let defaults = serde_json::to_value(Config::default()).unwrap();
     for key in defaults.as_object().unwrap().keys() {
-        let arg = serve.get_arguments().find(|a| a.get_id() == key.as_str()).unwrap();
+        let arg = serve
+            .get_arguments()
+            .find(|a| a.get_id() == key.as_str())
+            .unwrap();
         assert_eq!(arg.get_long().unwrap(), key.replace('_', "-"));
         assert_eq!(
             arg.get_env().unwrap().to_str().unwrap(),

@@ -55,8 +55,17 @@ pub fn small_zoo(dir: &Path) {
     answer(
         dir,
         &[
-            "zoo", "--out", "shapes", "--classes", "3", "--poses", "4", "--min-vertices", "900",
-            "--max-vertices", "1200",
+            "zoo",
+            "--out",
+            "shapes",
+            "--classes",
+            "3",
+            "--poses",
+            "4",
+            "--min-vertices",
+            "900",
+            "--max-vertices",
+            "1200",
         ],
     );
 }

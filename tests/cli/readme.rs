@@ -10,7 +10,9 @@ const ADDRESS: &str = "127.0.0.1:7345";
 /// Lines of all `sh` blocks between the tour's heading and the next one.
 fn tour() -> Vec<String> {
     let readme = std::fs::read_to_string(repository("README.md")).unwrap();
-    let begin = readme.find("## A tour in five minutes").expect("the README has a tour");
+    let begin = readme
+        .find("## A tour in five minutes")
+        .expect("the README has a tour");
     let rest = &readme[begin + 3..];
     let section = &rest[..rest.find("\n## ").unwrap_or(rest.len())];
     let mut lines = Vec::new();
@@ -39,14 +41,22 @@ fn every_line_of_the_tour_runs() {
         }
     }
     let dir = tempfile::tempdir().unwrap();
-    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let free = std::net::TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap();
     // Strict mode turns every line into an assertion; --fail-with-body makes curl one of them.
-    let mut script = String::from("set -euxo pipefail\ncurl() { command curl --fail-with-body --silent --show-error \"$@\"; }\n");
+    let mut script = String::from(
+        "set -euxo pipefail\ncurl() { command curl --fail-with-body --silent --show-error \"$@\"; }\n",
+    );
     for line in tour() {
         script += &line.replace(ADDRESS, &free.to_string());
         script.push('\n');
     }
-    let binaries = Path::new(env!("CARGO_BIN_EXE_shapelex")).parent().unwrap().to_owned();
+    let binaries = Path::new(env!("CARGO_BIN_EXE_shapelex"))
+        .parent()
+        .unwrap()
+        .to_owned();
     let path = std::env::var("PATH").unwrap_or_default();
     let output = Command::new("bash")
         .args(["-c", &script])
@@ -58,5 +68,8 @@ fn every_line_of_the_tour_runs() {
     let stdout = String::from_utf8_lossy(&output.stdout);
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{}\n{stdout}\n{stderr}", output.status);
-    assert!(stdout.contains("\"confidence\""), "a query was answered:\n{stdout}\n{stderr}");
+    assert!(
+        stdout.contains("\"confidence\""),
+        "a query was answered:\n{stdout}\n{stderr}"
+    );
 }

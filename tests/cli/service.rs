@@ -22,14 +22,19 @@ impl Service {
             .spawn()
             .unwrap();
         let mut line = String::new();
-        BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
+        BufReader::new(child.stdout.as_mut().unwrap())
+            .read_line(&mut line)
+            .unwrap();
         let url = last_json(&line)["listening"].as_str().unwrap().to_owned();
         Self { child, url }
     }
 
     /// Asks it to stop, as a container engine does, and waits.
     fn terminate(mut self) -> std::process::ExitStatus {
-        let asked = Command::new("kill").args(["-TERM", &self.child.id().to_string()]).status().unwrap();
+        let asked = Command::new("kill")
+            .args(["-TERM", &self.child.id().to_string()])
+            .status()
+            .unwrap();
         assert!(asked.success());
         let began = Instant::now();
         loop {
@@ -56,7 +61,10 @@ fn best(answer: &serde_json::Value) -> &str {
 
 fn first_file(dir: &Path, class: &str) -> String {
     let folder = dir.join("shapes").join(class);
-    let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    let mut names: Vec<_> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .collect();
     names.sort();
     names[0].to_str().unwrap().to_owned()
 }
@@ -80,28 +88,50 @@ fn index_query_export_and_import_in_a_local_directory() {
 
     let empty = run(dir.path(), &["query", "unseen.obj"]);
     assert_eq!(empty.status.code(), Some(1), "nothing is indexed");
-    assert!(stderr(&empty).contains("shapelex: unseen.obj: "), "{}", stderr(&empty));
+    assert!(
+        stderr(&empty).contains("shapelex: unseen.obj: "),
+        "{}",
+        stderr(&empty)
+    );
 
-    let indexed = last_json(&answer(dir.path(), &["index", "shapes", "--json", "--set", "atoms=32"]));
+    let indexed = last_json(&answer(
+        dir.path(),
+        &["index", "shapes", "--json", "--set", "atoms=32"],
+    ));
     assert_eq!(indexed["job"]["state"], "succeeded");
     assert_eq!(indexed["added"][&class], 3);
     let again = last_json(&answer(dir.path(), &["index", "shapes", "--json"]));
     assert_eq!(again["existing"], 11);
 
-    let stored = last_json(&answer(dir.path(), &["query", "unseen.obj", "--json", "--top", "2"]));
+    let stored = last_json(&answer(
+        dir.path(),
+        &["query", "unseen.obj", "--json", "--top", "2"],
+    ));
     assert_eq!(best(&stored), class);
     assert_eq!(stored["classes"].as_array().unwrap().len(), 2);
-    assert_eq!(stored["parameters"]["atoms"], 32, "the second run kept the parameters");
+    assert_eq!(
+        stored["parameters"]["atoms"], 32,
+        "the second run kept the parameters"
+    );
     let text = answer(dir.path(), &["query", "unseen.obj"]);
     assert!(text.contains(&class) && text.contains("score"), "{text}");
 
     let file = "dictionaries.safetensors";
     let exported = last_json(&answer(dir.path(), &["export", "--out", file, "--json"]));
     assert_eq!(exported["classes"].as_array().unwrap().len(), 3);
-    let from_file = last_json(&answer(dir.path(), &["query", "unseen.obj", "--dictionaries", file, "--json"]));
-    let imported = last_json(&answer(dir.path(), &["import", file, "--data", "other", "--json"]));
+    let from_file = last_json(&answer(
+        dir.path(),
+        &["query", "unseen.obj", "--dictionaries", file, "--json"],
+    ));
+    let imported = last_json(&answer(
+        dir.path(),
+        &["import", file, "--data", "other", "--json"],
+    ));
     assert_eq!(imported["generation"], 1);
-    let elsewhere = last_json(&answer(dir.path(), &["query", "unseen.obj", "--data", "other", "--json"]));
+    let elsewhere = last_json(&answer(
+        dir.path(),
+        &["query", "unseen.obj", "--data", "other", "--json"],
+    ));
     for same in [&from_file, &elsewhere] {
         assert_eq!(best(same), class);
         assert_eq!(
@@ -120,7 +150,17 @@ fn refused_files_are_named_and_stop_the_learning_unless_told_otherwise() {
     small_zoo(dir.path());
     let class = classes(dir.path())[0].clone();
     std::fs::write(dir.path().join("shapes").join(class).join("zz.obj"), "").unwrap();
-    let output = run(dir.path(), &["index", "shapes", "--set", "atoms=16", "--set", "samples_per_shape=200"]);
+    let output = run(
+        dir.path(),
+        &[
+            "index",
+            "shapes",
+            "--set",
+            "atoms=16",
+            "--set",
+            "samples_per_shape=200",
+        ],
+    );
     assert_eq!(output.status.code(), Some(1));
     assert!(stderr(&output).contains("zz.obj: "), "{}", stderr(&output));
     let text = String::from_utf8(output.stdout).unwrap();
@@ -134,15 +174,30 @@ fn a_service_is_indexed_queried_and_stopped() {
     let dir = tempfile::tempdir().unwrap();
     small_zoo(dir.path());
     let service = Service::start(dir.path(), &["--data", "served", "--max-body-mib", "1"]);
-    assert_eq!(answer(dir.path(), &["health", "--server", &service.url]), "alive\n");
+    assert_eq!(
+        answer(dir.path(), &["health", "--server", &service.url]),
+        "alive\n"
+    );
     answer(dir.path(), &["health", "--ready", "--server", &service.url]);
     answer(
         dir.path(),
-        &["index", "shapes", "--server", &service.url, "--set", "atoms=16", "--set", "samples_per_shape=200"],
+        &[
+            "index",
+            "shapes",
+            "--server",
+            &service.url,
+            "--set",
+            "atoms=16",
+            "--set",
+            "samples_per_shape=200",
+        ],
     );
     let class = classes(dir.path())[1].clone();
     let file = first_file(dir.path(), &class);
-    let ranked = last_json(&answer(dir.path(), &["query", &file, "--server", &service.url, "--json"]));
+    let ranked = last_json(&answer(
+        dir.path(),
+        &["query", &file, "--server", &service.url, "--json"],
+    ));
     assert_eq!(best(&ranked), class);
 
     let locked = run(dir.path(), &["query", &file, "--data", "served"]);
@@ -158,7 +213,10 @@ fn a_service_is_indexed_queried_and_stopped() {
     let gone = run(dir.path(), &["health", "--server", &url]);
     assert_eq!(gone.status.code(), Some(1));
     // What was acknowledged is still there.
-    let ranked = last_json(&answer(dir.path(), &["query", &file, "--data", "served", "--json"]));
+    let ranked = last_json(&answer(
+        dir.path(),
+        &["query", &file, "--data", "served", "--json"],
+    ));
     assert_eq!(best(&ranked), class);
 }
 
@@ -169,7 +227,11 @@ fn a_taken_port_is_said_at_once() {
     let address = taken.local_addr().unwrap().to_string();
     let output = run(dir.path(), &["serve", "--listen", &address]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(stderr(&output).contains(&format!("cannot listen on {address}")), "{}", stderr(&output));
+    assert!(
+        stderr(&output).contains(&format!("cannot listen on {address}")),
+        "{}",
+        stderr(&output)
+    );
 }
 
 #[test]
@@ -177,12 +239,25 @@ fn the_demo_recognises_poses_it_has_not_seen() {
     let dir = tempfile::tempdir().unwrap();
     let output = answer(
         dir.path(),
-        &["demo", "--json", "--classes", "4", "--poses", "3", "--set", "atoms=32"],
+        &[
+            "demo",
+            "--json",
+            "--classes",
+            "4",
+            "--poses",
+            "3",
+            "--set",
+            "atoms=32",
+        ],
     );
     let summary = last_json(&output);
     assert_eq!(summary["classes"], 4);
     assert_eq!(summary["queries"], 4);
     assert!(summary["top1"].as_f64().unwrap() > 0.7, "{summary}");
     assert!(summary["seconds"].as_f64().unwrap() > 0.0);
-    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0, "nothing is left behind");
+    assert_eq!(
+        std::fs::read_dir(dir.path()).unwrap().count(),
+        0,
+        "nothing is left behind"
+    );
 }

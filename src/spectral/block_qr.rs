@@ -1,0 +1,188 @@
+//! Orthonormalisation of a block of B columns, and the small products the block recurrence needs.
+//!
+//! Blocks are stored as n rows of B numbers. The QR factorisation is Cholesky-QR done twice (Yamamoto et al. 2015):
+//! two sweeps over the block, all in the inner loop's registers. A block that is close to rank-deficient is reported
+//! as such and goes to the caller's column-by-column fallback.
+
+use super::simd::{Simd, dispatch, fused};
+
+/// B × B, row by row.
+pub type Small<const B: usize> = [[f64; B]; B];
+
+/// Smallest pivot of the unit-diagonal Gram matrix that Cholesky-QR is trusted with: condition about 1e5.
+const SMALLEST_PIVOT: f64 = 1e-10;
+
+dispatch! {
+    /// XᵀY of two n × B blocks.
+    pub fn inner<const B: usize>(x: &[[f64; B]], y: &[[f64; B]]) -> Small<B> => inner_body
+}
+
+dispatch! {
+    /// W ← W + X H.
+    pub fn add_product<const B: usize>(w: &mut [[f64; B]], x: &[[f64; B]], h: &Small<B>) => add_product_body
+}
+
+dispatch! {
+    /// W ← W H.
+    fn multiply<const B: usize>(w: &mut [[f64; B]], h: &Small<B>) => multiply_body
+}
+
+#[inline(always)]
+fn inner_body<const FMA: bool, const B: usize>(x: &[[f64; B]], y: &[[f64; B]]) -> Small<B> {
+    let mut out = [[0.0; B]; B];
+    for (a, b) in x.iter().zip(y) {
+        for k in 0..B {
+            for r in 0..B {
+                out[k][r] = fused::<FMA>(a[k], b[r], out[k][r]);
+            }
+        }
+    }
+    out
+}
+
+#[inline(always)]
+fn add_product_body<const FMA: bool, const B: usize>(w: &mut [[f64; B]], x: &[[f64; B]], h: &Small<B>) {
+    for (w, x) in w.iter_mut().zip(x) {
+        for k in 0..B {
+            for r in 0..B {
+                w[r] = fused::<FMA>(x[k], h[k][r], w[r]);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn multiply_body<const FMA: bool, const B: usize>(w: &mut [[f64; B]], h: &Small<B>) {
+    for w in w.iter_mut() {
+        let mut out = [0.0; B];
+        for k in 0..B {
+            for r in 0..B {
+                out[r] = fused::<FMA>(w[k], h[k][r], out[r]);
+            }
+        }
+        *w = out;
+    }
+}
+
+/// −H.
+pub fn negated<const B: usize>(h: &Small<B>) -> Small<B> {
+    h.map(|row| row.map(|x| -x))
+}
+
+/// Hᵀ.
+pub fn transposed<const B: usize>(h: &Small<B>) -> Small<B> {
+    std::array::from_fn(|i| std::array::from_fn(|j| h[j][i]))
+}
+
+/// X Y.
+pub fn product<const B: usize>(x: &Small<B>, y: &Small<B>) -> Small<B> {
+    let mut out = [[0.0; B]; B];
+    for i in 0..B {
+        for k in 0..B {
+            for j in 0..B {
+                out[i][j] += x[i][k] * y[k][j];
+            }
+        }
+    }
+    out
+}
+
+/// R⁻¹ of an upper triangular R.
+pub fn upper_inverse<const B: usize>(r: &Small<B>) -> Small<B> {
+    let mut inverse = [[0.0; B]; B];
+    for j in 0..B {
+        inverse[j][j] = 1.0 / r[j][j];
+        for i in (0..j).rev() {
+            let sum: f64 = (i + 1..=j).map(|k| r[i][k] * inverse[k][j]).sum();
+            inverse[i][j] = -sum / r[i][i];
+        }
+    }
+    inverse
+}
+
+/// W = Q R in place, R upper triangular. `None`, with W unchanged in span but not orthonormal, when a column is all
+/// but a combination of the others or smaller than `negligible`.
+pub fn cholesky_qr<const B: usize>(simd: Simd, w: &mut [[f64; B]], negligible: f64) -> Option<Small<B>> {
+    let first = cholesky_step(simd, w, negligible)?;
+    let second = cholesky_step(simd, w, 0.0)?;
+    Some(product(&second, &first))
+}
+
+/// One Cholesky-QR sweep; returns R.
+fn cholesky_step<const B: usize>(simd: Simd, w: &mut [[f64; B]], negligible: f64) -> Option<Small<B>> {
+    let gram = inner::<B>(simd, w, w);
+    let norm: [f64; B] = std::array::from_fn(|i| gram[i][i].sqrt());
+    // A NaN must fail too, hence the negated comparison.
+    if norm.iter().any(|x| !(*x > negligible && x.is_finite())) {
+        return None;
+    }
+    // R of the Gram matrix scaled to a unit diagonal, columns scaled back at the end.
+    let mut r = [[0.0; B]; B];
+    for i in 0..B {
+        for j in i..B {
+            let sum: f64 = (0..i).map(|k| r[k][i] * r[k][j]).sum();
+            let value = gram[i][j] / (norm[i] * norm[j]) - sum;
+            if i == j {
+                if value < SMALLEST_PIVOT {
+                    return None;
+                }
+                r[i][i] = value.sqrt();
+            } else {
+                r[i][j] = value / r[i][i];
+            }
+        }
+    }
+    for row in &mut r {
+        for (x, n) in row.iter_mut().zip(&norm) {
+            *x *= n;
+        }
+    }
+    multiply::<B>(simd, w, &upper_inverse(&r));
+    Some(r)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn block() -> Vec<[f64; 4]> {
+        (0..50)
+            .map(|i| std::array::from_fn(|k| ((i * (k + 3)) as f64 * 0.7 + k as f64).sin()))
+            .collect()
+    }
+
+    #[test]
+    fn q_is_orthonormal_and_qr_is_w() {
+        for simd in [Simd::detect(), Simd::Baseline] {
+            let original = block();
+            let mut q = original.clone();
+            let r = cholesky_qr::<4>(simd, &mut q, 0.0).expect("full rank");
+            let gram = inner::<4>(simd, &q, &q);
+            let mut back = vec![[0.0; 4]; 50];
+            add_product::<4>(simd, &mut back, &q, &r);
+            for i in 0..4 {
+                for j in 0..4 {
+                    assert!((gram[i][j] - f64::from(u8::from(i == j))).abs() < 1e-14);
+                    assert!(j >= i || r[i][j] == 0.0);
+                }
+            }
+            assert!(
+                back.iter()
+                    .flatten()
+                    .zip(original.iter().flatten())
+                    .all(|(a, b)| (a - b).abs() < 1e-13)
+            );
+        }
+    }
+
+    #[test]
+    fn dependent_columns_are_reported() {
+        let mut w = block();
+        for row in &mut w {
+            row[3] = row[0] - 2.0 * row[1];
+        }
+        assert!(cholesky_qr::<4>(Simd::detect(), &mut w, 0.0).is_none());
+        let mut zero = vec![[0.0; 4]; 9];
+        assert!(cholesky_qr::<4>(Simd::detect(), &mut zero, 0.0).is_none());
+    }
+}

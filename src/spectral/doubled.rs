@@ -1,0 +1,129 @@
+//! The spectrum of an open surface glued to its mirror copy, without building the copy (method, step 10, H2).
+//!
+//! On the doubled surface every eigenfunction is even or odd under the mirror. The even ones are the eigenfunctions of
+//! the open surface with its natural (Neumann) boundary, the odd ones those with zero (Dirichlet) boundary values; so
+//! two solves of the open surface's size replace one of twice the size.
+//!
+//! Normalisation. Let the open mesh have masses a summing to 1. On the doubled mesh of area 1 an interior vertex has
+//! mass a/2 in each copy and a shared boundary vertex a/2 + a/2, while the stiffness forms of the copies add up. Both
+//! give λ' = 2 λ, and a function of unit norm on the open mesh has unit norm on the doubled one.
+
+use super::eigen::eigenpairs_of;
+use super::normalised::Normalised;
+use super::shift_invert::Analysis;
+use super::{EigenOptions, Eigenpairs, Operators, SpectralError, smallest_eigenpairs};
+use crate::cancel::Cancel;
+use faer::Mat;
+
+/// The `n` smallest eigenpairs with zero values on `boundary` (V entries); fewer where there are not so many free
+/// vertices. Vectors are V × n, zero on the boundary, ΦᵀAΦ = I. Errors as for
+/// [`smallest_eigenpairs`](super::smallest_eigenpairs).
+pub fn dirichlet_eigenpairs(
+    operators: &Operators,
+    boundary: &[bool],
+    n: usize,
+    options: &EigenOptions,
+    cancel: &Cancel,
+) -> Result<Eigenpairs, SpectralError> {
+    cancel.check()?;
+    let interior = interior(boundary);
+    let s = Normalised::new(operators, Some(&interior))?;
+    interior_eigenpairs(
+        &s,
+        &interior,
+        boundary.len(),
+        n.min(interior.len()),
+        options,
+        cancel,
+    )
+}
+
+fn interior(boundary: &[bool]) -> Vec<usize> {
+    (0..boundary.len()).filter(|&i| !boundary[i]).collect()
+}
+
+/// Solves on the interior and spreads the vectors over all vertices.
+fn interior_eigenpairs(
+    s: &Normalised,
+    interior: &[usize],
+    vertices: usize,
+    n: usize,
+    options: &EigenOptions,
+    cancel: &Cancel,
+) -> Result<Eigenpairs, SpectralError> {
+    let pairs = eigenpairs_of(s, n, options, cancel)?;
+    let mut vectors = Mat::<f64>::zeros(vertices, n);
+    for k in 0..n {
+        for (local, &i) in interior.iter().enumerate() {
+            vectors[(i, k)] = pairs.vectors[(local, k)];
+        }
+    }
+    Ok(Eigenpairs { vectors, ..pairs })
+}
+
+/// The `n` smallest eigenpairs of the doubled surface of area 1, restricted to the original copy.
+///
+/// `operators` are those of the open mesh (mass summing to 1), `boundary` (V entries) marks the vertices shared by the
+/// copies. Vectors are V × n. Errors as for [`smallest_eigenpairs`](super::smallest_eigenpairs).
+pub fn doubled_eigenpairs(
+    operators: &Operators,
+    boundary: &[bool],
+    n: usize,
+    options: &EigenOptions,
+    cancel: &Cancel,
+) -> Result<Eigenpairs, SpectralError> {
+    let vertices = boundary.len();
+    let interior = interior(boundary);
+    let n = n.min((vertices + interior.len()).saturating_sub(1));
+    let s = Normalised::new(operators, Some(&interior))?;
+    let analysis = if interior.is_empty() {
+        None
+    } else {
+        Some(Analysis::new(&s)?)
+    };
+    // Even functions outnumber odd ones by the boundary's share, a few in a hundred.
+    let mut even_count = (n * 6 / 10 + 6).min(n).min(vertices - 1);
+    let (even, odd_count) = loop {
+        let even = smallest_eigenpairs(operators, even_count, options, cancel)?;
+        // Odd eigenvalues up to the last even one: counted, not guessed.
+        let top = even.values.last().copied().unwrap_or(0.0);
+        let odd_count = match &analysis {
+            Some(analysis) => analysis.count_below(top * (1.0 + 1e-9))?,
+            None => 0,
+        };
+        let complete = even_count >= n.min(vertices - 1);
+        if complete || even_count + odd_count >= n {
+            let odd_count = if even_count == vertices - 1 { n } else { odd_count };
+            break (even, odd_count.min(n).min(interior.len()));
+        }
+        let ratio = n as f64 / (even_count + odd_count) as f64;
+        even_count = ((1.05 * ratio * even_count as f64) as usize + 4)
+            .min(n)
+            .min(vertices - 1);
+    };
+    let odd = interior_eigenpairs(&s, &interior, vertices, odd_count, options, cancel)?;
+    Ok(merge(&even, &odd, n))
+}
+
+/// The `n` smallest of both, eigenvalues doubled.
+fn merge(even: &Eigenpairs, odd: &Eigenpairs, n: usize) -> Eigenpairs {
+    let (mut e, mut o) = (0, 0);
+    let n = n.min(even.values.len() + odd.values.len());
+    let mut values = Vec::with_capacity(n);
+    let mut vectors = Mat::<f64>::zeros(even.vectors.nrows(), n);
+    for k in 0..n {
+        let take_even = match (even.values.get(e), odd.values.get(o)) {
+            (Some(a), Some(b)) => a <= b,
+            (left, _) => left.is_some(),
+        };
+        let (source, at) = if take_even { (even, &mut e) } else { (odd, &mut o) };
+        values.push(2.0 * source.values[*at]);
+        vectors.col_mut(k).copy_from(source.vectors.col(*at));
+        *at += 1;
+    }
+    Eigenpairs {
+        values,
+        vectors,
+        residual: even.residual.max(odd.residual),
+    }
+}

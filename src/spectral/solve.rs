@@ -1,0 +1,328 @@
+//! From S to its smallest eigenpairs: which solver, which shift, how large a subspace, and what happens on failure.
+//!
+//! The shift sits *inside* the wanted interval, at about 58 % of the eigenvalues. The wanted part of the spectrum of
+//! (S − c I)⁻¹ then has eigenvalues of both signs and only one end with unwanted neighbours, and a third less subspace
+//! converges than with a shift below zero.
+
+use super::dense;
+use super::lanczos::{Lanczos, Ritz};
+use super::normalised::Normalised;
+use super::residual::{self, Check};
+use super::shift_invert::{Analysis, Factor};
+use super::{EigenOptions, SpectralError};
+use crate::cancel::Cancel;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// Eigenpairs of S outside its null space.
+pub struct Pairs {
+    /// Ascending.
+    pub values: Vec<f64>,
+    /// n × k, row by row, in the order of S.
+    pub vectors: Vec<f64>,
+    pub check: Check,
+}
+
+/// Share of the wanted eigenvalues that should lie below the shift, and how far off is good enough.
+const BELOW_SHIFT: f64 = 0.58;
+const BELOW_SHIFT_RANGE: std::ops::RangeInclusive<f64> = 0.5..=0.66;
+
+/// Largest mesh the dense solver is the last resort for (288 MB per matrix, a minute).
+const DENSE_LAST_RESORT: usize = 6000;
+
+/// Eigenvalues below this share of the largest are zero as far as double precision can tell.
+pub const ZERO: f64 = 1e-9;
+
+/// Accepted ‖XᵀX − I‖_F.
+const ORTHOGONALITY: f64 = 1e-8;
+
+/// The block size for a mesh of n vertices: small blocks need less subspace, large ones make better use of memory.
+pub fn block_size(n: usize) -> usize {
+    match n {
+        0..6000 => 4,
+        6000..50_000 => 8,
+        _ => 16,
+    }
+}
+
+/// Columns of the subspace tried first for `wanted` pairs.
+pub fn first_subspace(wanted: usize, block: usize) -> usize {
+    let ratio = match block {
+        0..=4 => 1.66,
+        5..=8 => 1.86,
+        _ => 2.25,
+    };
+    ((ratio * wanted as f64) as usize + 4 * block).next_multiple_of(block)
+}
+
+/// Whether a problem of n unknowns is solved densely at once.
+pub fn is_dense(n: usize, wanted: usize) -> bool {
+    n < 3 * first_subspace(wanted, 4) / 2 + 100
+}
+
+/// The `wanted` smallest eigenpairs outside the null space, checked.
+pub fn smallest(
+    s: &Normalised,
+    wanted: usize,
+    options: &EigenOptions,
+    cancel: &Cancel,
+) -> Result<Pairs, SpectralError> {
+    if is_dense(s.n, wanted) {
+        return dense_pairs(s, wanted, options);
+    }
+    let mut reason = match sparse_pairs(s, wanted, options, cancel) {
+        Ok(pairs) => return Ok(pairs),
+        Err(SpectralError::Cancelled(c)) => return Err(c.into()),
+        Err(other) => other.to_string(),
+    };
+    if s.n <= DENSE_LAST_RESORT {
+        cancel.check()?;
+        match dense_pairs(s, wanted, options) {
+            Ok(pairs) => return Ok(pairs),
+            Err(other) => reason = format!("{reason}; dense: {other}"),
+        }
+    }
+    Err(SpectralError::NotConverged { detail: reason })
+}
+
+fn accept(s: &Normalised, pairs: (Vec<f64>, Vec<f64>), tolerance: f64) -> Result<Pairs, SpectralError> {
+    let (values, vectors) = pairs;
+    let floor = ZERO * values.last().copied().unwrap_or(0.0);
+    let check = residual::check(s, &values, &vectors, floor);
+    // Negated so that NaN is refused.
+    if !(check.excess <= tolerance && check.orthogonality <= ORTHOGONALITY) {
+        return Err(SpectralError::NotConverged {
+            detail: format!(
+                "residual {:.1e} (tolerance {tolerance:.1e}), orthogonality {:.1e}",
+                check.residual, check.orthogonality
+            ),
+        });
+    }
+    Ok(Pairs {
+        values,
+        vectors,
+        check,
+    })
+}
+
+fn dense_pairs(s: &Normalised, wanted: usize, options: &EigenOptions) -> Result<Pairs, SpectralError> {
+    accept(s, dense::smallest(s, wanted)?, options.tolerance)
+}
+
+fn sparse_pairs(
+    s: &Normalised,
+    wanted: usize,
+    options: &EigenOptions,
+    cancel: &Cancel,
+) -> Result<Pairs, SpectralError> {
+    let analysis = Analysis::new(s)?;
+    cancel.check()?;
+    let order = analysis.order();
+    let permuted = s.permuted(&order);
+    let (shift, factor) = choose_shift(&analysis, wanted, s.null.count, cancel)?;
+    let problem = Problem {
+        s: &permuted,
+        analysis: &analysis,
+        factor: &factor,
+        shift,
+        wanted,
+        options,
+        cancel,
+    };
+    let smallest_block = block_size(s.n);
+    let mut last = None;
+    for block in [4, 8, 16, 32].into_iter().filter(|&b| b >= smallest_block) {
+        let attempt = match block {
+            4 => problem.attempt::<4>(),
+            8 => problem.attempt::<8>(),
+            16 => problem.attempt::<16>(),
+            _ => problem.attempt::<32>(),
+        };
+        match attempt {
+            Ok(mut pairs) => {
+                pairs.vectors = unpermute(&pairs.vectors, &order, pairs.values.len());
+                return Ok(pairs);
+            }
+            Err(SpectralError::Cancelled(c)) => return Err(c.into()),
+            Err(other) => last = Some(other),
+        }
+    }
+    Err(last.unwrap_or(SpectralError::NotConverged {
+        detail: "no attempt was made".into(),
+    }))
+}
+
+/// Rows back in the order of the input.
+fn unpermute(x: &[f64], order: &[usize], k: usize) -> Vec<f64> {
+    let mut out = vec![0.0; x.len()];
+    for (row, &old) in x.chunks_exact(k).zip(order) {
+        out[old * k..(old + 1) * k].copy_from_slice(row);
+    }
+    out
+}
+
+/// A shift with about 58 % of the wanted eigenvalues below it, found by counting (Sylvester's inertia) from Weyl's law
+/// λ_k ≈ 4π k on a surface of area 1.
+fn choose_shift(
+    analysis: &Analysis,
+    wanted: usize,
+    null: usize,
+    cancel: &Cancel,
+) -> Result<(f64, Factor), SpectralError> {
+    let target = BELOW_SHIFT * wanted as f64;
+    let mut shift = 4.0 * std::f64::consts::PI * target;
+    // Bracket in shift; the count is monotone.
+    let (mut low, mut high) = (0.0, f64::INFINITY);
+    let mut best: Option<(f64, f64, Factor)> = None;
+    for _ in 0..12 {
+        cancel.check()?;
+        let factor = match analysis.factorise(shift) {
+            Ok(factor) => factor,
+            // The shift hit an eigenvalue of a leading block: step aside.
+            Err(_) => {
+                shift *= 1.0 + 1e-3;
+                continue;
+            }
+        };
+        let below = factor.below.saturating_sub(null) as f64;
+        let miss = (below / wanted as f64 - BELOW_SHIFT).abs();
+        if below < target {
+            low = shift;
+        } else {
+            high = shift;
+        }
+        let next = {
+            let linear = shift * (target / below.max(0.5)).clamp(0.125, 8.0);
+            let inside = linear > low && linear < high;
+            if inside || !high.is_finite() {
+                linear
+            } else {
+                0.5 * (low + high)
+            }
+        };
+        if best.as_ref().is_none_or(|b| miss < b.1) {
+            best = Some((shift, miss, factor));
+        }
+        if BELOW_SHIFT_RANGE.contains(&(below / wanted as f64)) || high - low <= 1e-6 * high {
+            break;
+        }
+        shift = next;
+    }
+    best.map(|(shift, _, factor)| (shift, factor))
+        .ok_or_else(|| SpectralError::Factorisation {
+            detail: "no shift could be factorised".into(),
+        })
+}
+
+struct Problem<'a> {
+    s: &'a Normalised,
+    analysis: &'a Analysis,
+    factor: &'a Factor,
+    shift: f64,
+    wanted: usize,
+    options: &'a EigenOptions,
+    cancel: &'a Cancel,
+}
+
+impl Problem<'_> {
+    /// Runs the recurrence until the wanted pairs have converged, then checks them and their number.
+    fn attempt<const B: usize>(&self) -> Result<Pairs, SpectralError> {
+        let available = (self.s.n - self.s.null.count) / B * B;
+        let first = first_subspace(self.wanted, B).min(available - B);
+        let capacity = (2 * first).min(available);
+        let rng = ChaCha8Rng::seed_from_u64(self.options.seed);
+        let mut lanczos = Lanczos::<B>::new(self.s.n, self.factor, &self.s.null, capacity, rng)?;
+        let mut next_look = first;
+        loop {
+            self.cancel.check()?;
+            lanczos.step()?;
+            let full = !lanczos.has_room();
+            if lanczos.dimension() < next_look && !full {
+                continue;
+            }
+            self.cancel.check()?;
+            let ritz = lanczos.ritz()?;
+            let (chosen, worst) = self.choose(&ritz);
+            if worst <= 0.3 * self.options.tolerance {
+                self.cancel.check()?;
+                let values = chosen[..self.wanted]
+                    .iter()
+                    .map(|&i| self.value(&ritz, i))
+                    .collect();
+                let vectors = lanczos.vectors(&ritz, &chosen[..self.wanted]);
+                drop(lanczos);
+                let pairs = accept(self.s, (values, vectors), self.options.tolerance)?;
+                self.cancel.check()?;
+                self.certify(&ritz, &chosen)?;
+                return Ok(pairs);
+            }
+            if full {
+                return Err(SpectralError::NotConverged {
+                    detail: format!(
+                        "block {B}, subspace {}: residual {worst:.1e}",
+                        lanczos.dimension()
+                    ),
+                });
+            }
+            next_look = lanczos.dimension() + (self.wanted / 16).max(2 * B);
+        }
+    }
+
+    /// λ of a Ritz pair.
+    fn value(&self, ritz: &Ritz, i: usize) -> f64 {
+        self.shift + 1.0 / ritz.theta[i]
+    }
+
+    /// Estimated relative residual of a Ritz pair after the free step of [`Lanczos::vectors`]: ‖r‖ / (θ² λ).
+    fn estimate(&self, ritz: &Ritz, i: usize, floor: f64) -> f64 {
+        let theta = ritz.theta[i];
+        ritz.tail.col(i).norm_l2() / (theta * theta) / self.value(ritz, i).max(floor)
+    }
+
+    /// Ritz pairs by ascending λ, those in the gap between 0 and the negative axis left out, and the worst estimate of
+    /// the wanted ones.
+    fn choose(&self, ritz: &Ritz) -> (Vec<usize>, f64) {
+        let mut chosen: Vec<usize> = (0..ritz.theta.len())
+            .filter(|&i| self.value(ritz, i) >= -ZERO * self.shift && ritz.theta[i] != 0.0)
+            .collect();
+        chosen.sort_by(|&a, &b| self.value(ritz, a).total_cmp(&self.value(ritz, b)));
+        if chosen.len() <= self.wanted {
+            return (chosen, f64::INFINITY);
+        }
+        let floor = ZERO * self.value(ritz, chosen[self.wanted - 1]);
+        let worst = chosen[..self.wanted]
+            .iter()
+            .map(|&i| self.estimate(ritz, i, floor))
+            .fold(0.0, f64::max);
+        (chosen, worst)
+    }
+
+    /// Proves that no eigenvalue was missed: the inertia of S − μ I must count as many eigenvalues below μ as were
+    /// found. μ lies in a gap just above the last wanted one, or, where that sits in a cluster, in one just below it.
+    fn certify(&self, ritz: &Ritz, chosen: &[usize]) -> Result<(), SpectralError> {
+        let value = |j: usize| self.value(ritz, chosen[j]);
+        // Pairs whose eigenvalue is known well enough to tell where a gap is: the error is quadratic in the residual.
+        let known = (self.wanted..chosen.len())
+            .take_while(|&j| self.estimate(ritz, chosen[j], 0.0) < 1e-3)
+            .last()
+            .unwrap_or(self.wanted - 1);
+        let above = (self.wanted - 1..known).take(8);
+        let below = (self.wanted.saturating_sub(40)..self.wanted - 1).rev();
+        let wide = |j: &usize| value(j + 1) - value(*j) > 1e-4 * value(*j + 1);
+        let Some(j) = above.chain(below).find(wide) else {
+            return Err(SpectralError::NotConverged {
+                detail: "no gap to count eigenvalues in".into(),
+            });
+        };
+        let shift = 0.5 * (value(j) + value(j + 1));
+        let counted = self.analysis.count_below(shift)?;
+        let found = j + 1 + self.s.null.count;
+        if counted == found {
+            Ok(())
+        } else {
+            Err(SpectralError::NotConverged {
+                detail: format!("{counted} eigenvalues lie below {shift:.6}, {found} were found"),
+            })
+        }
+    }
+}
