@@ -86,6 +86,13 @@ async fn body(request: Request) -> Result<bytes::Bytes, Problem> {
 }
 
 fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
+    // serde would read a list as the fields of a struct in their order; the API promises objects.
+    if body.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'[') {
+        return Err(Problem::new(
+            Code::InvalidField,
+            "expected an object, found a list",
+        ));
+    }
     serde_json::from_slice(body).map_err(|error| {
         let code = match error.classify() {
             serde_json::error::Category::Data => Code::InvalidField,
@@ -95,4 +102,16 @@ fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
             .with("line", error.line())
             .with("column", error.column())
     })
+}
+
+/// For fields that are objects: refuses the lists serde would read as their fields in order.
+pub(super) fn object<'de, D, T>(deserializer: D) -> Result<Option<T>, D::Error>
+where
+    D: serde::Deserializer<'de>,
+    T: DeserializeOwned,
+{
+    use serde::Deserialize;
+    let map = Option::<serde_json::Map<String, serde_json::Value>>::deserialize(deserializer)?;
+    map.map(|map| serde_json::from_value(serde_json::Value::Object(map)).map_err(serde::de::Error::custom))
+        .transpose()
 }

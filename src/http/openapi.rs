@@ -5,7 +5,6 @@ use super::dto::problem::ProblemDocument;
 use super::problem::Code;
 use super::routes::{classes, docs, health, index, jobs, query, shapes};
 use axum::http::Method;
-use serde_json::json;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 use utoipa::openapi::path::{Operation, PathItem};
@@ -19,8 +18,7 @@ use utoipa::{Modify, OpenApi};
         description = "Retrieval of deformable 3D shapes: upload meshes to classes, reindex, query with a mesh and get \
                        the classes ranked.\n\nEvery answer that is not a success is a problem document \
                        (`application/problem+json`, RFC 9457) with a stable `code`.",
-        license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0"),
-        contact()
+        license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     tags(
         (name = "classes", description = "What a query is recognised as"),
@@ -135,17 +133,7 @@ fn problem_response(codes: &[Code]) -> Response {
         .iter()
         .map(|code| format!("`{}`: {}", code.name(), code.title()))
         .collect();
-    let first = codes.first().copied().unwrap_or(Code::Internal);
-    let example = json!({
-        "type": format!("/docs#{}", first.name()),
-        "title": first.title(),
-        "status": first.status().as_u16(),
-        "detail": "what happened this time",
-        "code": first.name(),
-        "request_id": "01980c63-5f0e-7d52-a3f5-8b7f5d6f9a10",
-    });
-    let mut content = Content::new(Some(Ref::from_schema_name("ProblemDocument")));
-    content.example = Some(example);
+    let content = Content::new(Some(Ref::from_schema_name("ProblemDocument")));
     ResponseBuilder::new()
         .description(lines.join("; "))
         .content("application/problem+json", content)
@@ -210,7 +198,7 @@ fn problems_of(operation: &str) -> Vec<Code> {
             &[OneMeshExpected, IndexEmpty, IndexIncomplete],
         ]
         .concat(),
-        "query_batch" => [UPLOAD, &[ShuttingDown]].concat(),
+        "query_batch" => [UPLOAD, &[IndexEmpty]].concat(),
         _ => vec![],
     };
     codes.push(Internal);

@@ -83,12 +83,11 @@ codes! {
     JobNotFound, "job_not_found", 404, "There is no such job";
     OriginalMissing, "original_missing", 500, "The stored file is gone or damaged";
     ClassExists, "class_exists", 409, "A class of that name exists";
-    ShapeExists, "shape_exists", 409, "The shape is in another class";
     JobFinished, "job_finished", 409, "The job has ended and cannot be cancelled";
     RevisionMismatch, "revision_mismatch", 412, "The class has changed since it was read";
     // --- the index ---
     IndexEmpty, "index_empty", 409, "No class is indexed yet";
-    NothingToIndex, "nothing_to_index", 409, "There is nothing to index";
+    NothingToIndex, "nothing_to_index", 409, "There are no shapes to learn from";
     IndexIncomplete, "index_incomplete", 409, "A class lacks a dictionary the query needs";
     // --- load and faults ---
     QueueFull, "queue_full", 503, "The job queue is full";

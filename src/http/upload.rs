@@ -206,13 +206,14 @@ pub fn body_too_large(limit: usize) -> Problem {
 }
 
 fn check_length(headers: &HeaderMap, limit: usize) -> Result<(), Problem> {
-    let declared = headers
-        .get(header::CONTENT_LENGTH)
-        .and_then(|v| v.to_str().ok()?.parse::<u64>().ok());
-    match declared {
+    match content_length(headers) {
         Some(length) if length > limit as u64 => Err(body_too_large(limit).with("body_bytes", length)),
         _ => Ok(()),
     }
+}
+
+fn content_length(headers: &HeaderMap) -> Option<u64> {
+    headers.get(header::CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
 }
 
 fn media_type(headers: &HeaderMap) -> Option<String> {
@@ -276,8 +277,10 @@ async fn receive_raw(
         ));
     }
     let name = name.or_else(|| disposition_name(request.headers()));
+    // The declared length was checked against the limit; pages nobody writes to cost nothing.
+    let expected = content_length(request.headers()).unwrap_or(0);
+    let mut body = BytesMut::with_capacity(usize::try_from(expected).unwrap_or(0));
     let mut stream = request.into_body().into_data_stream();
-    let mut body = BytesMut::new();
     while let Some(chunk) = stream.next().await {
         let chunk = chunk.map_err(|e| {
             Problem::new(Code::InvalidRequest, "the body broke off while it arrived").logged(e)

@@ -25,10 +25,10 @@ pub fn openness(mesh: &TriMesh) -> f64 {
 
 /// Summed length of edges.
 pub(super) fn boundary_length(vertices: &[[f64; 3]], edges: &[[u32; 2]]) -> f64 {
-    edges
-        .iter()
-        .map(|e| distance(&vertices[e[0] as usize], &vertices[e[1] as usize]))
-        .sum()
+    // Folded from +0, as an empty float sum is −0.
+    edges.iter().fold(0.0, |length, e| {
+        length + distance(&vertices[e[0] as usize], &vertices[e[1] as usize])
+    })
 }
 
 /// Euclidean distance of two points.

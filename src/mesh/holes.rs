@@ -1,26 +1,29 @@
 //! Closing small boundary loops.
 
 use super::boundary::{boundary_length, distance};
-use super::edges::edge_census;
 use super::trimesh::face_area;
 
 /// A fan face below this share of the total area is not added, as the cleaning would drop it.
 const NO_AREA: f64 = 1e-12;
 
 /// Closes every boundary loop with a perimeter below `below` · √area by a fan around the mean of its vertices, and
-/// returns how many were closed.
+/// returns how many were closed. `boundary` are the edges of one face ([`edge_census`](super::edges::edge_census)).
 ///
 /// The new vertices are appended, so the indices of the old ones stay. The area is that before anything is closed.
 /// Fan faces run against their neighbours' direction, as on a consistently oriented surface. A loop whose whole fan
 /// has no area (a slit) stays.
-pub(super) fn fill_small_holes(vertices: &mut Vec<[f64; 3]>, faces: &mut Vec<[u32; 3]>, below: f64) -> usize {
+pub(super) fn fill_small_holes(
+    vertices: &mut Vec<[f64; 3]>,
+    faces: &mut Vec<[u32; 3]>,
+    boundary: &[[u32; 2]],
+    below: f64,
+) -> usize {
     if below.is_nan() || below <= 0.0 {
         return 0;
     }
     let area: f64 = faces.iter().map(|f| face_area(vertices, f)).sum();
-    let boundary = edge_census(vertices.len(), faces).boundary;
     let mut filled = 0;
-    for edges in boundary_loops(vertices, &boundary) {
+    for edges in boundary_loops(vertices, boundary) {
         if boundary_length(vertices, &edges) >= below * area.sqrt() {
             continue;
         }
@@ -123,7 +126,13 @@ pub(super) fn boundary_loops(vertices: &[[f64; 3]], boundary: &[[u32; 2]]) -> Ve
 
 #[cfg(test)]
 mod tests {
+    use super::super::edges::edge_census;
     use super::*;
+
+    fn fill(vertices: &mut Vec<[f64; 3]>, faces: &mut Vec<[u32; 3]>, below: f64) -> usize {
+        let boundary = edge_census(vertices.len(), faces).boundary;
+        fill_small_holes(vertices, faces, &boundary, below)
+    }
 
     /// A flat n × n grid of unit squares, two triangles each.
     fn grid(n: u32) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
@@ -162,7 +171,7 @@ mod tests {
     #[test]
     fn a_small_hole_is_closed_and_the_outer_boundary_stays() {
         let (mut vertices, mut faces) = without(8, &[(3, 3)]);
-        assert_eq!(fill_small_holes(&mut vertices, &mut faces, 1.2), 1);
+        assert_eq!(fill(&mut vertices, &mut faces, 1.2), 1);
         assert_eq!(vertices.len(), 82);
         assert_eq!(vertices[81], [3.5, 3.5, 0.0]);
         assert!((area(&vertices, &faces) - 64.0).abs() < 1e-12);
@@ -176,7 +185,7 @@ mod tests {
     #[test]
     fn holes_that_touch_in_a_vertex_are_two_loops() {
         let (mut vertices, mut faces) = without(8, &[(3, 3), (4, 4), (4, 2)]);
-        assert_eq!(fill_small_holes(&mut vertices, &mut faces, 1.2), 3);
+        assert_eq!(fill(&mut vertices, &mut faces, 1.2), 3);
         assert!((area(&vertices, &faces) - 64.0).abs() < 1e-12);
     }
 
@@ -184,10 +193,10 @@ mod tests {
     fn a_hole_above_the_limit_stays() {
         let (mut vertices, mut faces) = without(8, &[(2, 3), (3, 3), (4, 3), (5, 3)]); // perimeter 10 > 1.2 · √60
         let before = faces.clone();
-        assert_eq!(fill_small_holes(&mut vertices, &mut faces, 1.2), 0);
+        assert_eq!(fill(&mut vertices, &mut faces, 1.2), 0);
         assert_eq!(faces, before);
-        assert_eq!(fill_small_holes(&mut vertices, &mut faces, 0.0), 0);
-        assert_eq!(fill_small_holes(&mut vertices, &mut faces, f64::NAN), 0);
+        assert_eq!(fill(&mut vertices, &mut faces, 0.0), 0);
+        assert_eq!(fill(&mut vertices, &mut faces, f64::NAN), 0);
     }
 
     #[test]

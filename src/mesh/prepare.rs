@@ -106,11 +106,16 @@ pub struct PrepareReport {
 pub fn prepare(soup: TriangleSoup, options: &PrepareOptions) -> Result<(TriMesh, PrepareReport), MeshError> {
     let mut report = PrepareReport::default();
     let mut mesh = clean(soup, options.components, &mut report)?;
-    report.non_manifold_edges = edge_census(mesh.vertices.len(), &mesh.faces).non_manifold;
+    let mut census = edge_census(mesh.vertices.len(), &mesh.faces);
+    report.non_manifold_edges = census.non_manifold;
 
     let before = mesh.vertices.len();
-    let simplified = simplify_to(&mut mesh, options.working_size, options.components)?;
-    report.simplified_from = (simplified != Simplified::No).then_some(before);
+    let oriented = census.inconsistent == 0;
+    let simplified = simplify_to(&mut mesh, options.working_size, options.components, oriented)?;
+    if simplified != Simplified::No {
+        report.simplified_from = Some(before);
+        census = edge_census(mesh.vertices.len(), &mesh.faces);
+    }
 
     let Cleaned {
         mut vertices,
@@ -118,14 +123,20 @@ pub fn prepare(soup: TriangleSoup, options: &PrepareOptions) -> Result<(TriMesh,
         scale,
     } = mesh;
     report.vertices = vertices.len();
-    report.holes_filled = fill_small_holes(&mut vertices, &mut faces, options.fill_holes_below);
+    report.holes_filled = fill_small_holes(
+        &mut vertices,
+        &mut faces,
+        &census.boundary,
+        options.fill_holes_below,
+    );
     report.faces = faces.len();
-
-    let boundary = edge_census(vertices.len(), &faces).boundary;
+    if report.holes_filled > 0 {
+        census = edge_census(vertices.len(), &faces);
+    }
     let mesh = TriMesh::new(vertices, faces, report.vertices)?;
     let area = mesh.area();
-    report.boundary_edges = boundary.len();
-    report.openness = boundary_length(mesh.vertices(), &boundary) / area.sqrt();
+    report.boundary_edges = census.boundary.len();
+    report.openness = boundary_length(mesh.vertices(), &census.boundary) / area.sqrt();
     // Clamped, as the squared units of a finite file may overflow and reports are written as JSON.
     report.area = (area * scale * scale).min(f64::MAX);
     report.warnings = warnings(&report, simplified);
@@ -165,7 +176,10 @@ fn warnings(report: &PrepareReport, simplified: Simplified) -> Vec<String> {
     );
     warn(
         report.non_manifold_edges > 0,
-        format!("{} edges have more than two faces.", report.non_manifold_edges),
+        format!(
+            "The mesh is not a manifold: more than two faces meet at {} of its edges.",
+            report.non_manifold_edges
+        ),
     );
     warn(
         report.openness > OPEN,

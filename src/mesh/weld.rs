@@ -30,8 +30,8 @@ pub(super) fn weld(vertices: &[[f64; 3]]) -> Welded {
     // Cells are numbered from 1, so that the cell before the first has a number too.
     let cell = |p: &[f64; 3]| {
         (0..3).fold(0u128, |key, k| {
-            let i = ((p[k] - low[k]) / side) as u128 + 1;
-            key << BITS | i.min((1 << BITS) - 2)
+            let i = ((p[k] - low[k]) / side) as u64 + 1;
+            key << BITS | u128::from(i.min((1 << BITS) - 2))
         })
     };
     let mut order: Vec<u128> = vertices

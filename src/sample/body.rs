@@ -6,7 +6,7 @@
 //! few solids.
 
 use super::skeleton::{Skeleton, Solid};
-use super::vector::{Motion, Rotation, Vec3, add_scaled, dot, norm, scale, sub};
+use super::vector::{Motion, Vec3, add_scaled, dot, norm, scale, sub};
 
 /// A bound on how fast a solid's field changes per unit of length. The fields are not exact distances; this leaves
 /// room for the worst taper and the flattest ellipsoid in use.
@@ -23,7 +23,6 @@ struct Posed {
 #[derive(Clone, Debug)]
 pub struct Body {
     parts: Vec<Posed>,
-    widest_blend: f64,
 }
 
 impl Body {
@@ -38,8 +37,7 @@ impl Body {
                 blend: part.blend,
             })
             .collect();
-        let widest_blend = parts.iter().map(|p| p.blend).fold(0.0, f64::max);
-        Self { parts, widest_blend }
+        Self { parts }
     }
 
     /// Indices of all parts: the list to start pruning from.
@@ -115,19 +113,21 @@ impl Body {
     /// What of `parts` can matter within `radius` of `centre`, or `None` when the surface cannot pass there.
     pub fn prune(&self, centre: Vec3, radius: f64, parts: &[u16]) -> Option<Vec<u16>> {
         let reach = LIPSCHITZ * radius;
-        // Three widths instead of one, because the union takes the parts in order, not by distance.
-        let slack = 3.0 * self.widest_blend;
-        let values: Vec<f64> = parts
-            .iter()
-            .map(|&i| field(&self.parts[i as usize].solid, centre))
-            .collect();
-        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-        if least - slack > reach || least < -reach {
+        // The union grows no faster than its parts: its gradient is a weighted mean of theirs.
+        if self.value(centre, parts).abs() > reach {
             return None;
         }
-        let keep = parts.iter().zip(&values);
+        let part = |i: u16| &self.parts[i as usize];
+        let values: Vec<f64> = parts.iter().map(|&i| field(&part(i).solid, centre)).collect();
+        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+        // A part flows into the minimum within its own blend. The union takes parts in order, not by distance, so
+        // the minimum may come later and then looks back as far as the widest blend around.
+        let widest = parts.iter().map(|&i| part(i).blend).fold(0.0, f64::max);
         Some(
-            keep.filter(|&(_, &v)| v - reach <= least + reach + slack)
+            parts
+                .iter()
+                .zip(&values)
+                .filter(|&(&i, &v)| v - reach <= least + reach + part(i).blend + widest)
                 .map(|(&i, _)| i)
                 .collect(),
         )
@@ -192,15 +192,17 @@ fn field(solid: &Solid, p: Vec3) -> f64 {
             let v = sub(p, centre);
             let q = frame.apply_transposed(v);
             let largest = radii[0].max(radii[1]).max(radii[2]);
-            let ball = norm(v) - largest;
+            let smallest = radii[0].min(radii[1]).min(radii[2]);
+            let ball = (norm(v) - largest).max(-smallest);
             let f = norm([q[0] / radii[0], q[1] / radii[1], q[2] / radii[2]]);
             let slope = norm([
                 q[0] / (radii[0] * radii[0]),
                 q[1] / (radii[1] * radii[1]),
                 q[2] / (radii[2] * radii[2]),
             ]);
-            // f (f − 1) / |∇| is the distance to first order; far from a flat ellipsoid it is too small, and there
-            // the distance to the ball around it is the better bound.
+            // f (f − 1) / |∇| is the distance to first order. Far outside a flat ellipsoid it is too small; there the
+            // distance to the ball around it is better. Deep inside it goes below the smallest half-axis, the
+            // greatest depth there is.
             if slope > 0.0 {
                 (f * (f - 1.0) / slope).max(ball)
             } else {
@@ -238,7 +240,7 @@ fn balls(solid: &Solid) -> [(Vec3, f64); 2] {
 }
 
 /// A capsule that stands for the solid: its segment and the radii at both ends. An ellipsoid's runs along its
-/// longest axis with the radius of its middle one.
+/// longest axis, with the mean of the other two as its radius.
 fn spine(solid: &Solid) -> (Vec3, Vec3, f64, f64) {
     match *solid {
         Solid::Cone { ends, radius } => (ends[0], ends[1], radius[0], radius[1]),
@@ -246,9 +248,9 @@ fn spine(solid: &Solid) -> (Vec3, Vec3, f64, f64) {
             let mut order = [0, 1, 2];
             order.sort_by(|&i, &j| radii[j].total_cmp(&radii[i]));
             let mut axis = [0.0; 3];
-            axis[order[0]] = radii[order[0]] - radii[order[1]];
+            let r = 0.5 * (radii[order[1]] + radii[order[2]]);
+            axis[order[0]] = radii[order[0]] - r;
             let half = frame.apply(axis);
-            let r = radii[order[1]];
             (sub(centre, half), add_scaled(centre, half, 1.0), r, r)
         }
     }

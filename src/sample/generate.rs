@@ -5,7 +5,7 @@ use super::pose::{Clearance, draw, place};
 use super::remesh::remesh;
 use super::skeleton::Skeleton;
 use super::surface::polygonise;
-use super::topology::is_sphere;
+use super::topology::{is_sphere, is_sphere_if_closed};
 use super::vector::{Motion, Rotation, Vec3, add_scaled};
 use crate::mesh::TriangleSoup;
 use rand::seq::SliceRandom;
@@ -17,7 +17,7 @@ const ATTEMPTS: usize = 24;
 /// Draws of angles per attempt until no two limbs are too near each other.
 const DRAWS: usize = 60;
 /// Vertices of the marching surface per vertex asked for: enough for simplification to choose well.
-const OVERSAMPLING: f64 = 4.0;
+const OVERSAMPLING: f64 = 3.5;
 /// Marching tetrahedra make about this many vertices per squared grid spacing of area.
 const VERTICES_PER_SQUARE: f64 = 4.5;
 
@@ -28,6 +28,9 @@ pub struct ZooOptions {
     pub min_vertices: usize,
     /// Most vertices of a mesh. Each pose draws its number between the two.
     pub max_vertices: usize,
+    /// Leave the creature standing as it was built, y up and facing +z, in its own units: for pictures. Otherwise
+    /// every pose is turned, moved and scaled at random.
+    pub upright: bool,
 }
 
 impl Default for ZooOptions {
@@ -36,6 +39,7 @@ impl Default for ZooOptions {
         Self {
             min_vertices: 1500,
             max_vertices: 3000,
+            upright: false,
         }
     }
 }
@@ -91,6 +95,10 @@ impl Species {
         &self.name
     }
 
+    #[doc(hidden)]
+    pub fn thinnest(&self) -> f64 {
+        self.skeleton.thinnest()
+    }
     /// The creature at rest.
     pub fn skeleton(&self) -> &Skeleton {
         &self.skeleton
@@ -110,6 +118,7 @@ impl Species {
         let ZooOptions {
             min_vertices: min,
             max_vertices: max,
+            upright,
         } = *options;
         if min < least || max > most || min > max {
             return Err(SampleError::Options {
@@ -125,15 +134,25 @@ impl Species {
         let vertices = rng.random_range(min + slack..=max - slack);
         for attempt in 0..ATTEMPTS {
             let reach = 0.93f64.powi((attempt as i32 - 4).max(0));
-            let body = self.body(reach, &mut rng);
+            // The body is turned against the grid, whose axes are fixed.
+            let turn = random_rotation(&mut rng);
+            let body = self.body(reach, turn, &mut rng);
             let offset: Vec3 = rng.random();
             let fine = polygonise(&body, self.spacing(&body, vertices, attempt), offset);
-            if !is_sphere(fine.vertices.len(), &fine.faces) {
+            if !is_sphere_if_closed(fine.vertices.len(), &fine.faces) {
                 continue;
             }
-            let mesh = remesh(&body, &fine, vertices);
+            let Some(mesh) = remesh(&body, &fine, vertices) else {
+                continue;
+            };
             if (min..=max).contains(&mesh.vertices.len()) && is_sphere(mesh.vertices.len(), &mesh.faces) {
-                return Ok(disguise(mesh, &mut rng));
+                let mut mesh = shuffled(mesh, &mut rng);
+                if upright {
+                    mesh.vertices = mesh.vertices.iter().map(|&v| turn.apply_transposed(v)).collect();
+                } else {
+                    disguise(&mut mesh, &mut rng);
+                }
+                return Ok(mesh);
             }
         }
         Err(SampleError::NoSurface {
@@ -143,14 +162,14 @@ impl Species {
         })
     }
 
-    /// A posed body in a random orientation, its limbs apart.
-    fn body(&self, reach: f64, rng: &mut ChaCha8Rng) -> Body {
-        let whole = Motion::about([0.0; 3], random_rotation(rng));
-        let mut reach = reach;
-        let mut body = Body::new(
-            &self.skeleton,
-            &place(&self.skeleton, &draw(&self.skeleton, reach, rng), whole),
-        );
+    /// A posed body, turned as a whole, its limbs apart.
+    fn body(&self, mut reach: f64, turn: Rotation, rng: &mut ChaCha8Rng) -> Body {
+        let whole = Motion::about([0.0; 3], turn);
+        let mut posed = |reach: f64| {
+            let angles = draw(&self.skeleton, reach, rng);
+            Body::new(&self.skeleton, &place(&self.skeleton, &angles, whole))
+        };
+        let mut body = posed(reach);
         for draws in 1..DRAWS {
             if self.clearance.holds(&body) {
                 break;
@@ -159,8 +178,7 @@ impl Species {
             if draws > DRAWS / 2 {
                 reach *= 0.9;
             }
-            let angles = draw(&self.skeleton, reach, rng);
-            body = Body::new(&self.skeleton, &place(&self.skeleton, &angles, whole));
+            body = posed(reach);
         }
         body
     }
@@ -169,23 +187,30 @@ impl Species {
     fn spacing(&self, body: &Body, vertices: usize, attempt: usize) -> f64 {
         let wanted = OVERSAMPLING * vertices as f64;
         let by_area = (VERTICES_PER_SQUARE * 0.7 * body.rough_area() / wanted).sqrt();
-        by_area.min(0.9 * self.skeleton.thinnest()) * 0.93f64.powi(attempt as i32)
+        by_area.min(1.15 * self.skeleton.thinnest()) * 0.93f64.powi(attempt as i32)
     }
 }
 
-/// Shuffles vertices and faces, moves and scales the mesh.
-fn disguise(mesh: TriangleSoup, rng: &mut ChaCha8Rng) -> TriangleSoup {
+/// The same mesh with its vertices and faces in another order.
+fn shuffled(mesh: TriangleSoup, rng: &mut ChaCha8Rng) -> TriangleSoup {
     let mut order: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
     order.shuffle(rng);
-    let size = 2f64.powf(rng.random_range(-1.0..1.0));
-    let shift: Vec3 = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
     let mut vertices = vec![[0.0; 3]; mesh.vertices.len()];
-    for (v, &place) in mesh.vertices.iter().zip(&order) {
-        vertices[place as usize] = add_scaled(shift, *v, size);
+    for (&v, &place) in mesh.vertices.iter().zip(&order) {
+        vertices[place as usize] = v;
     }
     let mut faces: Vec<[u32; 3]> = mesh.faces.iter().map(|f| f.map(|v| order[v as usize])).collect();
     faces.shuffle(rng);
     TriangleSoup { vertices, faces }
+}
+
+/// Scales by a factor between 0.5 and 2, then moves by up to a unit along each axis.
+fn disguise(mesh: &mut TriangleSoup, rng: &mut ChaCha8Rng) {
+    let size = 2f64.powf(rng.random_range(-1.0..1.0));
+    let shift: Vec3 = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
+    for v in &mut mesh.vertices {
+        *v = add_scaled(shift, *v, size);
+    }
 }
 
 /// A rotation drawn uniformly: a normalised quaternion from the ball (Marsaglia 1972 by rejection).

@@ -68,12 +68,21 @@ impl Clearance {
         let pairs = body
             .gaps()
             .into_iter()
-            .filter(|&(_, _, gap)| gap > 0.0)
-            .map(|(i, j, gap)| (i, j, 0.7 * gap.min(1.2 * body.blend(i, j))))
+            .map(|(i, j, gap)| (i, j, gap, body.blend(i, j)))
+            .filter(|&(_, _, gap, blend)| gap > 0.6 * blend)
+            .map(|(i, j, gap, blend)| (i, j, 0.6 * gap.min(1.2 * blend)))
             .collect();
         Self { pairs }
     }
 
+    #[doc(hidden)]
+    pub fn bad(&self, body: &Body) -> Vec<(usize, usize, f64)> {
+        self.pairs
+            .iter()
+            .copied()
+            .filter(|&(i, j, least)| body.gap(i, j) < least)
+            .collect()
+    }
     /// Whether no two parts are nearer than they may be.
     pub fn holds(&self, body: &Body) -> bool {
         self.pairs.iter().all(|&(i, j, least)| body.gap(i, j) >= least)

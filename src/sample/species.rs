@@ -193,10 +193,10 @@ fn lioness() -> Skeleton {
             skull: [0.13, 0.125, 0.15],
             muzzle: [0.24, 0.09, 0.07],
             droop: 12.0,
-            ear: [0.045, 0.045, 0.026],
+            ear: [0.05, 0.05, 0.032],
             ear_set: [40.0, 0.75],
         },
-        tail: [0.8, -25.0, 0.036, 0.028],
+        tail: [0.8, -25.0, 0.04, 0.032],
         tail_bones: 4,
         swing: 28.0,
     };
@@ -235,7 +235,7 @@ fn horse() -> Skeleton {
             skull: [0.1, 0.12, 0.16],
             muzzle: [0.4, 0.1, 0.068],
             droop: 42.0,
-            ear: [0.035, 0.085, 0.028],
+            ear: [0.045, 0.1, 0.038],
             ear_set: [15.0, 0.55],
         },
         tail: [0.75, -62.0, 0.06, 0.045],
@@ -271,10 +271,10 @@ fn camel() -> Skeleton {
             skull: [0.09, 0.1, 0.15],
             muzzle: [0.33, 0.085, 0.062],
             droop: 18.0,
-            ear: [0.03, 0.05, 0.026],
+            ear: [0.04, 0.06, 0.036],
             ear_set: [35.0, 0.6],
         },
-        tail: [0.4, -65.0, 0.04, 0.03],
+        tail: [0.4, -65.0, 0.045, 0.04],
         tail_bones: 2,
         swing: 24.0,
     };
@@ -300,7 +300,7 @@ fn elephant() -> Skeleton {
         stance: [0.33, 0.33],
         fore: leg,
         hind: leg,
-        neck: [0.32, 30.0, 0.34, 0.3],
+        neck: [0.36, 30.0, 0.34, 0.22],
         neck_bones: 1,
         head: Head {
             skull: [0.3, 0.36, 0.33],
@@ -309,39 +309,44 @@ fn elephant() -> Skeleton {
             ear: [0.0, 0.0, 0.0],
             ear_set: [0.0, 0.0],
         },
-        tail: [0.7, -72.0, 0.06, 0.05],
+        tail: [0.75, -66.0, 0.085, 0.065],
         tail_bones: 2,
         swing: 22.0,
     };
     let (mut s, at) = body.build();
     let [_, y, z] = at.skull;
+    // A short neck and wide ears leave the head little room to turn.
+    s.stiffen(at.head, 0.4);
+    if let Some(neck) = s.bones[at.head].parent {
+        s.stiffen(neck, 0.3);
+    }
     // Trunk: down from the face, curling forwards at the end.
     let trunk = [
         ([0.0, y - 0.08, z + 0.24], 0.17),
         ([0.0, y - 0.34, z + 0.45], 0.125),
         ([0.0, y - 0.64, z + 0.52], 0.1),
-        ([0.0, y - 0.92, z + 0.54], 0.082),
-        ([0.0, y - 1.13, z + 0.64], 0.07),
+        ([0.0, y - 0.92, z + 0.54], 0.088),
+        ([0.0, y - 1.13, z + 0.64], 0.08),
     ];
     let curl = range([-22.0, 12.0], [-12.0, 12.0], FIXED);
     s.chain(
         at.head,
         Side::Left,
         &trunk,
-        &[range([-12.0, 8.0], [-10.0, 10.0], FIXED), curl],
+        &[range([-12.0, 8.0], [-8.0, 8.0], FIXED), curl],
     );
     for side in Side::BOTH {
         let tusk = [
-            ([0.17, y - 0.2, z + 0.2], 0.06),
-            ([0.24, y - 0.48, z + 0.5], 0.042),
+            ([0.2, y - 0.18, z + 0.14], 0.075),
+            ([0.37, y - 0.5, z + 0.58], 0.06),
         ];
         s.chain(at.head, side, &tusk, &[Range::default()]);
     }
     s.ellipsoid_pair(
         at.head,
-        [0.46, y - 0.03, z - 0.12],
-        [0.33, 0.4, 0.085],
-        [0.0, 35.0, -12.0],
+        [0.48, y + 0.06, z - 0.06],
+        [0.34, 0.42, 0.11],
+        [0.0, 32.0, -8.0],
     );
     s
 }
@@ -372,17 +377,17 @@ fn giraffe() -> Skeleton {
             skull: [0.09, 0.1, 0.15],
             muzzle: [0.34, 0.08, 0.055],
             droop: 30.0,
-            ear: [0.035, 0.08, 0.028],
+            ear: [0.045, 0.1, 0.04],
             ear_set: [70.0, 0.6],
         },
-        tail: [0.65, -70.0, 0.042, 0.034],
+        tail: [0.65, -70.0, 0.046, 0.042],
         tail_bones: 2,
         swing: 20.0,
     };
     let (mut s, at) = body.build();
     let [_, y, z] = at.skull;
     for side in Side::BOTH {
-        let horn = [([0.045, y + 0.05, z], 0.034), ([0.055, y + 0.2, z - 0.05], 0.034)];
+        let horn = [([0.055, y + 0.05, z], 0.04), ([0.11, y + 0.2, z - 0.05], 0.042)];
         s.chain(at.head, side, &horn, &[Range::default()]);
     }
     s
@@ -422,6 +427,10 @@ fn rabbit() -> Skeleton {
         swing: 22.0,
     };
     let (mut s, at) = body.build();
+    // It sits on its haunches: the long hind feet have little room under the belly.
+    for &bone in at.limbs[2..].iter().flatten() {
+        s.stiffen(bone, 0.5);
+    }
     s.ellipsoid(at.hips, [0.0, 0.27, -0.25], [0.045, 0.045, 0.045], [0.0; 3]);
     s
 }
@@ -592,7 +601,7 @@ fn spider() -> Skeleton {
         }
     }
     for side in Side::BOTH {
-        let fang = [([0.05, 0.28, 0.26], 0.042), ([0.06, 0.2, 0.34], 0.03)];
+        let fang = [([0.055, 0.27, 0.24], 0.042), ([0.085, 0.17, 0.31], 0.032)];
         s.chain(front, side, &fang, &[range([-15.0, 15.0], FIXED, FIXED)]);
     }
     s
@@ -616,8 +625,8 @@ fn kangaroo() -> Skeleton {
             ([0.2, 0.035, 0.3], 0.036),
         ];
         let ranges = [
-            range([-30.0, 25.0], FIXED, [-2.0, 10.0]),
-            range([-15.0, 35.0], FIXED, FIXED),
+            range([-20.0, 25.0], FIXED, [-2.0, 10.0]),
+            range([-8.0, 24.0], FIXED, FIXED),
             range([-25.0, 15.0], FIXED, FIXED),
         ];
         s.chain(hips, side, &leg, &ranges);

@@ -8,6 +8,7 @@ use super::body::Body;
 use super::vector::{Vec3, add_scaled, lerp, sub};
 use crate::mesh::TriangleSoup;
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// Cubes along the edge of a leaf block.
 const BLOCK: usize = 4;
@@ -33,7 +34,7 @@ pub fn polygonise(body: &Body, spacing: f64, offset: Vec3) -> TriangleSoup {
         spacing,
         vertices: Vec::new(),
         faces: Vec::new(),
-        on_edge: HashMap::new(),
+        on_edge: HashMap::default(),
     };
     grid.visit([0; 3], cubes, &body.all_parts());
     TriangleSoup {
@@ -49,7 +50,28 @@ struct Grid<'a> {
     vertices: Vec<Vec3>,
     faces: Vec<[u32; 3]>,
     /// Vertex on the edge from a grid corner towards one of seven neighbours.
-    on_edge: HashMap<([u16; 3], u8), u32>,
+    on_edge: HashMap<u64, u32, BuildHasherDefault<KeyHasher>>,
+}
+
+/// Spreads an edge's number over the table by one multiplication (Knuth's multiplicative hashing): the keys are our
+/// own, so the default's defence against chosen keys would only cost time.
+#[derive(Default)]
+struct KeyHasher(u64);
+
+impl Hasher for KeyHasher {
+    fn write(&mut self, bytes: &[u8]) {
+        for &b in bytes {
+            self.write_u64(u64::from(b) ^ self.0);
+        }
+    }
+
+    fn write_u64(&mut self, key: u64) {
+        self.0 = key.wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(26);
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
+    }
 }
 
 /// A corner of a tetrahedron: its offset in the cube as bits x, y, z, its place in the grid, its field.
@@ -162,7 +184,9 @@ impl Grid<'_> {
         // Along a path of Kuhn's subdivision bits are only added, so one end's bits contain the other's.
         let (from, to) = if a.bits < b.bits { (a, b) } else { (b, a) };
         let start = offset(cube, from.bits, 1);
-        let key = (start, to.bits ^ from.bits);
+        let key = start
+            .iter()
+            .fold(u64::from(to.bits ^ from.bits), |key, &c| key << 16 | u64::from(c));
         if let Some(&v) = self.on_edge.get(&key) {
             return v;
         }

@@ -35,6 +35,8 @@ impl Store {
             ..Garbage::default()
         };
         let _gate = self.inner.files.write().unwrap_or_else(PoisonError::into_inner);
+        // Looked at again under the gate: a change that failed meanwhile may still need its files.
+        self.inner.writable()?;
         files::walk(&self.inner.path.join("originals"), |path, name| {
             let kept = match name.parse::<ContentHash>() {
                 Ok(content) => self.is_referenced(content)?,

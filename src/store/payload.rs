@@ -22,8 +22,12 @@ pub(super) fn unpack<T: DeserializeOwned>(payload: &[u8]) -> Result<T, String> {
     }
 }
 
-pub(super) fn to_json<T: Serialize>(value: &T) -> Result<String, String> {
-    serde_json::to_string(value).map_err(|e| e.to_string())
+/// JSON text that is known to read back: a number that is not finite becomes `null`, and a record that cannot be read
+/// must never be written.
+pub(super) fn to_json<T: Serialize + DeserializeOwned>(value: &T) -> Result<String, String> {
+    let text = serde_json::to_string(value).map_err(|e| e.to_string())?;
+    from_json::<T>(&text).map_err(|e| format!("it would not read back: {e}"))?;
+    Ok(text)
 }
 
 pub(super) fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, String> {

@@ -25,7 +25,7 @@ impl SledBackend {
             .cache_capacity(cache_bytes)
             .mode(sled::Mode::LowSpace)
             .flush_every_ms(None);
-        let db = caught("open the key-value store", || config.open())?;
+        let db = caught("open the key-value store", || Ok(config.open().map_err(unopened)))??;
         Ok(Self { db })
     }
 }
@@ -45,6 +45,28 @@ fn remove_unfinished_snapshots(path: &Path) -> Result<(), StoreError> {
         }
     }
     Ok(())
+}
+
+/// An engine that does not open its own directory calls that a defect, an unsupported version or a short read; all
+/// are damage to us, and have a way out. What the file system refuses has none, and stays what it is.
+fn unopened(error: sled::Error) -> StoreError {
+    use std::io::ErrorKind as Kind;
+    match error {
+        sled::Error::Io(error)
+            if matches!(
+                error.kind(),
+                Kind::PermissionDenied
+                    | Kind::ReadOnlyFilesystem
+                    | Kind::OutOfMemory
+                    | Kind::ResourceBusy
+                    | Kind::StorageFull
+                    | Kind::QuotaExceeded
+            ) =>
+        {
+            StoreError::io("open the key-value store", &error)
+        }
+        other => StoreError::damaged("the key-value store", other.to_string()),
+    }
 }
 
 fn caught<T>(what: &str, work: impl FnOnce() -> sled::Result<T>) -> Result<T, StoreError> {

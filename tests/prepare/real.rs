@@ -45,8 +45,8 @@ fn every_real_mesh_is_prepared() {
             assert!(report.vertices <= 2000);
             assert!(
                 report.simplified_from.is_none() || report.vertices >= 1950,
-                "{}",
-                report.vertices
+                "{}: {report:?}",
+                file.display()
             );
             simplified += usize::from(report.simplified_from.is_some());
             open += usize::from(report.openness > 0.0);

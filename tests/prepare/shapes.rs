@@ -22,7 +22,7 @@ pub fn shared(folder: &str, test: &str) -> Option<PathBuf> {
 pub fn read(path: &Path) -> TriangleSoup {
     let text = std::fs::read_to_string(path).unwrap();
     let mut soup = TriangleSoup::default();
-    let mut fan = |faces: &mut Vec<[u32; 3]>, polygon: &[u32]| {
+    let fan = |faces: &mut Vec<[u32; 3]>, polygon: &[u32]| {
         for k in 1..polygon.len() - 1 {
             faces.push([polygon[0], polygon[k], polygon[k + 1]]);
         }
@@ -218,23 +218,23 @@ pub fn rotation() -> [[f64; 3]; 3] {
     [[ca, -sa, 0.0], [sa * cb, ca * cb, -sb], [sa * sb, ca * sb, cb]]
 }
 
-/// Edge lengths of each face, sorted, faces sorted: what does not change under motions and orders.
-pub fn edge_lengths(mesh: &TriMesh) -> Vec<[f64; 3]> {
-    let mut all: Vec<[f64; 3]> = (mesh.faces().iter())
-        .map(|f| {
-            let mut lengths = [0, 1, 2].map(|k| {
-                let (p, q) = (
-                    mesh.vertices()[f[k] as usize],
-                    mesh.vertices()[f[(k + 1) % 3] as usize],
-                );
-                (0..3).map(|i| (p[i] - q[i]).powi(2)).sum::<f64>().sqrt()
-            });
-            lengths.sort_by(f64::total_cmp);
-            lengths
+/// The edge lengths of all faces, sorted: what does not change under motions and orders.
+pub fn edge_lengths(mesh: &TriMesh) -> Vec<f64> {
+    let mut all: Vec<f64> = (mesh.faces().iter())
+        .flat_map(|f| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]])
+        .map(|e| {
+            let [p, q] = e.map(|v| mesh.vertices()[v as usize]);
+            (0..3).map(|i| (p[i] - q[i]).powi(2)).sum::<f64>().sqrt()
         })
         .collect();
-    all.sort_by(|x, y| x.partial_cmp(y).unwrap());
+    all.sort_by(f64::total_cmp);
     all
+}
+
+/// Largest difference of two equally long lists.
+pub fn largest_difference(x: &[f64], y: &[f64]) -> f64 {
+    assert_eq!(x.len(), y.len());
+    x.iter().zip(y).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
 }
 
 /// Asserts that a prepared mesh keeps every promise of [`TriMesh`] and has unit area about the origin.

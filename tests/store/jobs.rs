@@ -121,7 +121,13 @@ fn best(jobs: &Jobs, lobes: f64) -> String {
     let (_, soup) = shapelex::mesh::read(&source, &Limits::default()).unwrap();
     let live = jobs.live_index();
     let query = describe_query(soup, &live.index.parameters, &Cancel::new(), &|_| {}).unwrap();
-    let ranking = rank(&query, &live.index, &Cancel::new()).unwrap();
+    let ranking = rank(
+        &query.views,
+        &live.index,
+        live.index.parameters.rank_by,
+        &Cancel::new(),
+    )
+    .unwrap();
     ranking.classes[0].label.clone()
 }
 

@@ -31,6 +31,7 @@ pub struct StartReindex {
     /// Start from the values of this preset instead of those the index has.
     pub preset: Option<PresetName>,
     /// Single values on top. Changed values make every class stale.
+    #[serde(deserialize_with = "crate::http::extract::object")]
     pub parameters: Option<ParameterOverrides>,
 }
 

@@ -39,6 +39,14 @@ pub async fn start_reindex(
                 parameters: parameters(s, &body)?,
                 scope: scope(s, body.scope)?,
             };
+            // With an index the job would empty it, which is right after the last class was deleted. Without one it
+            // would do nothing.
+            if s.jobs.live_index().generation.is_none() && s.store.statistics()?.shapes == 0 {
+                return Err(Problem::new(
+                    Code::NothingToIndex,
+                    "no class has a shape yet; POST meshes to /v1/classes/{class}/shapes first",
+                ));
+            }
             Ok(s.jobs.enqueue(kind)?)
         })
         .await?;

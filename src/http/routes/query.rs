@@ -7,6 +7,7 @@ use crate::http::dto::query::{BatchLine, BatchSummary, QueryAnswer, QueryOptions
 use crate::http::dto::{Binary, FilesForm};
 use crate::http::extract::ApiQuery;
 use crate::http::problem::{Code, Problem};
+use crate::http::problem_from::index_empty;
 use crate::http::upload::{self, Upload, UploadedMesh};
 use crate::http::{metrics, respond};
 use crate::jobs::LiveIndex;
@@ -156,7 +157,11 @@ async fn begin(
         state.config.upload_timeout,
     )
     .await?;
-    Ok((state.jobs.live_index(), upload))
+    let live = state.jobs.live_index();
+    if live.index.classes.is_empty() {
+        return Err(index_empty());
+    }
+    Ok((live, upload))
 }
 
 async fn rank(

@@ -1,0 +1,12 @@
+//! The service, driven through its router: one binary, no sockets.
+#![cfg(feature = "service")]
+
+mod bad_input;
+mod batch;
+mod catalogue;
+mod contract;
+mod flow;
+mod harness;
+mod meshes;
+mod operation;
+mod uploads;
