@@ -5,7 +5,7 @@ use faer::Mat;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use shapelex::cancel::Cancel;
-use shapelex::coding::{Dictionary, LearnParameters, Workspace, encode_with, learn, score_with};
+use shapelex::coding::{Dictionary, LearnParameters, Signals, Workspace, encode_with, learn, score_signals};
 use std::hint::black_box;
 
 /// Bumps that move and swell smoothly from signal to signal, as signatures do along a mesh; unit norm times `norm`.
@@ -49,6 +49,9 @@ fn coding(criterion: &mut Criterion) {
     ] {
         let training = signals(dimension, 3000, norm, 1);
         let query = signals(dimension, 1500, norm, 2);
+        let Ok(ready) = Signals::new(query.as_ref()) else {
+            continue;
+        };
         let parameters = LearnParameters {
             atoms,
             ..LearnParameters::default()

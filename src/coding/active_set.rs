@@ -7,29 +7,34 @@
 //! search ends at the exact solution. Rounding can break the argument where atoms depend on each other; a step limit
 //! catches that, and the caller falls back to coordinate descent.
 
-use super::cholesky::Factor;
+use super::cholesky::{Factor, dot};
 use super::lasso::column;
 use faer::MatRef;
 
 /// Atoms added per look at the gradient: more saves looks, fewer saves atoms that must leave again.
 const ADDED_AT_ONCE: usize = 3;
+/// Atoms passed over together where none of them can violate.
+const CHUNK: usize = 32;
 
-/// One Lasso: its data in terms of the dictionary.
+/// One Lasso. Correlations and Gram matrix at single precision find the atoms that matter, and exact ones decide.
 #[derive(Clone, Copy)]
 pub(super) struct Problem<'a> {
+    /// D, M × L, columns contiguous.
+    pub atoms: MatRef<'a, f64>,
     /// DᵀD, L × L, columns contiguous.
     pub gram: MatRef<'a, f64>,
-    /// Dᵀs, L values.
-    pub correlation: &'a [f64],
+    /// DᵀD at single precision.
+    pub rough_gram: MatRef<'a, f32>,
+    /// s, M values.
+    pub signal: &'a [f64],
+    /// ‖s‖.
+    pub norm: f64,
+    /// Dᵀs to within `error`, L values.
+    pub rough_correlation: &'a [f32],
+    pub error: f64,
     pub lambda: f64,
     /// How far |d_jᵀ(s − Da)| may exceed λ.
     pub tolerance: f64,
-}
-
-impl<'a> Problem<'a> {
-    pub fn gram_column(&self, j: usize) -> &'a [f64] {
-        column(self.gram, j)
-    }
 }
 
 /// The active set of the signal at hand; what it holds after one signal starts the next.
@@ -41,11 +46,19 @@ pub(super) struct ActiveSet {
     pub values: Vec<f64>,
     signs: Vec<f64>,
     factor: Factor,
-    member: Vec<bool>,
-    gradient: Vec<f64>,
+    gradient: Vec<f32>,
+    /// d_jᵀs of the atoms met so far, valid where `known` holds the number of the signal.
+    correlation: Vec<f64>,
+    known: Vec<u64>,
+    signal: u64,
     target: Vec<f64>,
+    /// F⁻¹ (c_A − λ sign), row by row valid as far as it reaches.
+    forward: Vec<f64>,
     column: Vec<f64>,
-    added: Vec<usize>,
+    /// Atoms to add, and their gradient.
+    added: Vec<(usize, f64)>,
+    /// Atoms whose rough gradient does not tell.
+    doubtful: Vec<usize>,
     /// Atoms given up on for this signal because they depend on the set and rounding hides a way to exchange them.
     refused: Vec<usize>,
 }
@@ -57,22 +70,29 @@ impl ActiveSet {
         self.values.clear();
         self.signs.clear();
         self.factor.clear();
+        self.forward.clear();
         self.refused.clear();
-        self.member.clear();
-        self.member.resize(atoms, false);
         self.gradient.resize(atoms, 0.0);
+        self.correlation.resize(atoms, 0.0);
+        self.known.resize(atoms, 0);
     }
 
     /// Solves `problem` from the set at hand. False where the step limit was met first.
+    #[inline(always)]
     pub fn solve(&mut self, problem: &Problem<'_>) -> bool {
-        let limit = 100 + 8 * problem.correlation.len();
+        let limit = 100 + 8 * problem.rough_correlation.len();
         self.refused.clear();
+        self.signal += 1;
+        self.forward.clear();
         self.restart(problem);
         for _ in 0..limit {
             self.update_gradient(problem);
             if !self.find_violations(problem) {
                 let bound = problem.lambda + problem.tolerance;
-                return self.refused.iter().all(|&j| self.gradient[j].abs() <= bound);
+                let refused = std::mem::take(&mut self.refused);
+                return refused
+                    .iter()
+                    .all(|&j| self.exact_gradient(problem, j).abs() <= bound);
             }
             self.extend(problem);
             self.descend(problem);
@@ -80,7 +100,28 @@ impl ActiveSet {
         false
     }
 
+    /// d_jᵀs.
+    #[inline(always)]
+    pub fn correlation(&mut self, problem: &Problem<'_>, j: usize) -> f64 {
+        if self.known[j] != self.signal {
+            self.known[j] = self.signal;
+            self.correlation[j] = dot(column(problem.atoms, j), problem.signal);
+        }
+        self.correlation[j]
+    }
+
+    #[inline(always)]
+    fn exact_gradient(&mut self, problem: &Problem<'_>, j: usize) -> f64 {
+        let gram = column(problem.gram, j);
+        let mut gradient = self.correlation(problem, j);
+        for (&i, value) in self.atoms.iter().zip(&self.values) {
+            gradient -= gram[i] * value;
+        }
+        gradient
+    }
+
     /// Takes the set of another signal over: drops the atoms whose value has the wrong sign until none has.
+    #[inline(always)]
     fn restart(&mut self, problem: &Problem<'_>) {
         loop {
             self.solve_target(problem);
@@ -97,60 +138,93 @@ impl ActiveSet {
         }
     }
 
-    /// target ← (G_AA)⁻¹ (c_A − λ sign).
+    /// target ← (G_AA)⁻¹ (c_A − λ sign). Only the rows of the factor that are new are solved forwards again.
+    #[inline(always)]
     fn solve_target(&mut self, problem: &Problem<'_>) {
-        self.target.clear();
-        for (&j, sign) in self.atoms.iter().zip(&self.signs) {
-            self.target.push(problem.correlation[j] - problem.lambda * sign);
+        for k in self.forward.len()..self.atoms.len() {
+            let correlation = self.correlation(problem, self.atoms[k]);
+            let value = correlation - problem.lambda * self.signs[k];
+            let value = self.factor.solve_row(k, &self.forward, value);
+            self.forward.push(value);
         }
-        self.factor.solve_lower(&mut self.target);
+        self.target.clone_from(&self.forward);
         self.factor.solve_upper(&mut self.target);
     }
 
-    /// gradient ← c − G a.
+    /// gradient ← c − G a, at single precision.
+    #[inline(always)]
     fn update_gradient(&mut self, problem: &Problem<'_>) {
         let gradient = &mut self.gradient[..];
-        gradient.copy_from_slice(problem.correlation);
+        gradient.copy_from_slice(problem.rough_correlation);
         let pairs = self.atoms.chunks_exact(4).zip(self.values.chunks_exact(4));
         for (atoms, values) in pairs {
-            let [g0, g1, g2, g3] = [0, 1, 2, 3].map(|k| problem.gram_column(atoms[k]));
+            let [g0, g1, g2, g3] = [0, 1, 2, 3].map(|k| column(problem.rough_gram, atoms[k]));
+            let [v0, v1, v2, v3] = [0, 1, 2, 3].map(|k| values[k] as f32);
             let columns = g0.iter().zip(g1).zip(g2.iter().zip(g3));
             for (q, ((a, b), (c, d))) in gradient.iter_mut().zip(columns) {
-                *q -= (values[0] * a + values[1] * b) + (values[2] * c + values[3] * d);
+                *q -= (v0 * a + v1 * b) + (v2 * c + v3 * d);
             }
         }
         let rest = self.atoms.len() / 4 * 4;
         for (&j, value) in self.atoms[rest..].iter().zip(&self.values[rest..]) {
-            for (q, g) in gradient.iter_mut().zip(problem.gram_column(j)) {
+            let value = *value as f32;
+            for (q, g) in gradient.iter_mut().zip(column(problem.rough_gram, j)) {
                 *q -= value * g;
             }
         }
     }
 
     /// Fills `added` with the atoms outside the set that violate |q_j| ≤ λ most, worst first.
+    #[inline(always)]
     fn find_violations(&mut self, problem: &Problem<'_>) -> bool {
+        let norm1: f64 = self.values.iter().map(|a| a.abs()).sum();
+        let terms = (self.atoms.len() + 1) as f64;
+        let rounding = 4.0 * f64::from(f32::EPSILON) * terms.sqrt() * (problem.norm + norm1);
+        let error = problem.error + rounding;
         let bound = problem.lambda + problem.tolerance;
+        let (surely, perhaps) = ((bound + error) as f32, (bound - error) as f32);
         self.added.clear();
-        for (j, q) in self.gradient.iter().enumerate() {
-            let q = q.abs();
-            if q <= bound || self.member[j] || self.refused.contains(&j) {
+        self.doubtful.clear();
+        for &j in self.atoms.iter().chain(&self.refused) {
+            self.gradient[j] = 0.0;
+        }
+        for (n, chunk) in self.gradient.chunks(CHUNK).enumerate() {
+            let mut any = false;
+            for q in chunk {
+                any |= q.abs() > perhaps;
+            }
+            if !any {
                 continue;
             }
-            let gradient = &self.gradient;
-            let place = self.added.partition_point(|&i| gradient[i].abs() >= q);
-            if place < ADDED_AT_ONCE {
-                self.added.truncate(ADDED_AT_ONCE - 1);
-                self.added.insert(place, j);
+            for (k, q) in chunk.iter().enumerate() {
+                if q.abs() > surely {
+                    insert(&mut self.added, n * CHUNK + k, f64::from(*q));
+                } else if q.abs() > perhaps {
+                    self.doubtful.push(n * CHUNK + k);
+                }
+            }
+        }
+        if self.added.is_empty() {
+            for n in 0..self.doubtful.len() {
+                let j = self.doubtful[n];
+                if self.atoms.contains(&j) || self.refused.contains(&j) {
+                    continue;
+                }
+                let gradient = self.exact_gradient(problem, j);
+                if gradient.abs() > bound {
+                    insert(&mut self.added, j, gradient);
+                }
             }
         }
         !self.added.is_empty()
     }
 
     /// Puts the atoms of `added` into the set, with value zero and the sign of their gradient.
+    #[inline(always)]
     fn extend(&mut self, problem: &Problem<'_>) {
         for n in 0..self.added.len() {
-            let j = self.added[n];
-            let sign = self.gradient[j].signum();
+            let (j, gradient) = self.added[n];
+            let sign = gradient.signum();
             if self.append(problem, j, 0.0, sign) {
                 continue;
             }
@@ -164,8 +238,9 @@ impl ActiveSet {
         }
     }
 
+    #[inline(always)]
     fn append(&mut self, problem: &Problem<'_>, j: usize, value: f64, sign: f64) -> bool {
-        let gram = problem.gram_column(j);
+        let gram = column(problem.gram, j);
         self.column.clear();
         self.column.extend(self.atoms.iter().map(|&i| gram[i]));
         if !self.factor.push(&mut self.column, gram[j]) {
@@ -174,13 +249,13 @@ impl ActiveSet {
         self.atoms.push(j);
         self.values.push(value);
         self.signs.push(sign);
-        self.member[j] = true;
         true
     }
 
     /// Brings in atom `j` that is a combination of the set, d_j = D_A w: along (−w, 1) the residual does not change
     /// and the violation says that ‖a‖₁ falls, so move until a value of the set reaches zero and let `j` take its
     /// place. False where rounding leaves no such value. `column` still holds F⁻¹ G_Aj from the attempt to append.
+    #[inline(always)]
     fn exchange(&mut self, problem: &Problem<'_>, j: usize, sign: f64) -> bool {
         self.factor.solve_upper(&mut self.column);
         let mut step = f64::INFINITY;
@@ -201,6 +276,7 @@ impl ActiveSet {
     }
 
     /// Moves the values to the minimiser over the set; whoever would change sign on the way leaves at zero.
+    #[inline(always)]
     fn descend(&mut self, problem: &Problem<'_>) {
         loop {
             self.solve_target(problem);
@@ -228,14 +304,25 @@ impl ActiveSet {
         }
     }
 
+    #[inline(always)]
     fn drop_atom(&mut self, k: usize) {
         self.factor.remove(k);
-        self.member[self.atoms[k]] = false;
+        self.forward.truncate(k);
         self.atoms.remove(k);
         self.signs.remove(k);
         self.values.remove(k);
         if k < self.target.len() {
             self.target.remove(k);
         }
+    }
+}
+
+/// Keeps the [`ADDED_AT_ONCE`] atoms of largest gradient, in that order.
+#[inline(always)]
+fn insert(added: &mut Vec<(usize, f64)>, j: usize, gradient: f64) {
+    let place = added.partition_point(|(_, other)| other.abs() >= gradient.abs());
+    if place < ADDED_AT_ONCE {
+        added.truncate(ADDED_AT_ONCE - 1);
+        added.insert(place, (j, gradient));
     }
 }

@@ -14,10 +14,12 @@ pub(super) struct Factor {
     rotations: Vec<(f64, f64)>,
 }
 
+#[inline(always)]
 fn start(row: usize) -> usize {
     row * (row + 1) / 2
 }
 
+#[inline(always)]
 pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (x8, y8) = (x.chunks_exact(8), y.chunks_exact(8));
@@ -36,11 +38,13 @@ pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
 
 impl Factor {
     /// Number of rows.
+    #[inline(always)]
     pub fn len(&self) -> usize {
         self.inverse_diagonal.len()
     }
 
     /// Forgets all rows, keeps the memory.
+    #[inline(always)]
     pub fn clear(&mut self) {
         self.rows.clear();
         self.inverse_diagonal.clear();
@@ -48,6 +52,7 @@ impl Factor {
 
     /// Appends a row: `column` holds the new row of G up to, not including, its diagonal, and is overwritten by the
     /// new row of F. False, and nothing changed but `column`, where the new row depends on the others.
+    #[inline(always)]
     pub fn push(&mut self, column: &mut [f64], diagonal: f64) -> bool {
         self.solve_lower(column);
         let pivot = diagonal - dot(column, column);
@@ -62,6 +67,7 @@ impl Factor {
     }
 
     /// Deletes row and column `k` of G, by Givens rotations: O((len − k)²).
+    #[inline(always)]
     pub fn remove(&mut self, k: usize) {
         let len = self.len();
         self.rotations.clear();
@@ -79,7 +85,7 @@ impl Factor {
                 carried = c * next - s * carried;
             }
             let next = self.rows[from + i];
-            let root = carried.hypot(next);
+            let root = (carried * carried + next * next).sqrt();
             self.rows[to + i - 1] = root;
             self.inverse_diagonal[i - 1] = root.recip();
             self.rotations.push((carried / root, next / root));
@@ -89,15 +95,23 @@ impl Factor {
     }
 
     /// x ← F⁻¹ x.
+    #[inline(always)]
     pub fn solve_lower(&self, x: &mut [f64]) {
         for i in 0..x.len() {
             let (done, rest) = x.split_at_mut(i);
-            let row = &self.rows[start(i)..start(i) + i];
-            rest[0] = (rest[0] - dot(row, done)) * self.inverse_diagonal[i];
+            rest[0] = self.solve_row(i, done, rest[0]);
         }
     }
 
+    /// Entry `i` of F⁻¹ b, from b_i = `value` and the entries before it.
+    #[inline(always)]
+    pub fn solve_row(&self, i: usize, before: &[f64], value: f64) -> f64 {
+        let row = &self.rows[start(i)..start(i) + i];
+        (value - dot(row, before)) * self.inverse_diagonal[i]
+    }
+
     /// x ← F⁻ᵀ x.
+    #[inline(always)]
     pub fn solve_upper(&self, x: &mut [f64]) {
         for i in (0..x.len()).rev() {
             let (before, rest) = x.split_at_mut(i);

@@ -1,6 +1,7 @@
 //! A dictionary: L atoms of M values, and what the Lasso needs of it over and over.
 
 use super::CodingError;
+use super::screen::Screen;
 use faer::Mat;
 
 /// A learnt dictionary D with its Gram matrix.
@@ -8,6 +9,7 @@ use faer::Mat;
 pub struct Dictionary {
     atoms: Mat<f64>,
     gram: Mat<f64>,
+    screen: Screen,
 }
 
 impl Dictionary {
@@ -30,7 +32,8 @@ impl Dictionary {
             }
         }
         let gram = atoms.transpose() * &atoms;
-        Ok(Self { atoms, gram })
+        let screen = Screen::new(&atoms, &gram);
+        Ok(Self { atoms, gram, screen })
     }
 
     /// D, M × L, one atom per column.
@@ -41,6 +44,10 @@ impl Dictionary {
     /// DᵀD, L × L, symmetric.
     pub fn gram(&self) -> &Mat<f64> {
         &self.gram
+    }
+
+    pub(super) fn screen(&self) -> &Screen {
+        &self.screen
     }
 
     /// M, the length of an atom.

@@ -4,6 +4,8 @@
 //! elsewhere.
 
 use super::active_set::Problem;
+use super::cholesky::dot;
+use super::lasso::column;
 use super::{Codes, CodingError, Dictionary};
 use faer::MatRef;
 
@@ -54,17 +56,20 @@ fn violation(gradient: f64, value: f64, lambda: f64) -> f64 {
 /// Cyclic coordinate descent on `code` (L values, any start), until no condition is violated by more than the
 /// problem's tolerance. Converges for every dictionary (Tseng 2001), slowly for coherent ones. Returns the violation
 /// that is left.
-pub(super) fn coordinate_descent(problem: &Problem<'_>, code: &mut [f64], gradient: &mut Vec<f64>) -> f64 {
+pub(super) fn coordinate_descent(problem: &Problem<'_>, code: &mut [f64]) -> f64 {
     const SWEEPS: usize = 20_000;
+    let correlation: Vec<f64> = (0..code.len())
+        .map(|j| dot(column(problem.atoms, j), problem.signal))
+        .collect();
+    let mut gradient = correlation.clone();
     let mut left = f64::INFINITY;
     for sweep in 0..SWEEPS {
         if sweep % 50 == 0 {
             // Afresh now and then: the updates below add up rounding.
-            gradient.clear();
-            gradient.extend_from_slice(problem.correlation);
+            gradient.copy_from_slice(&correlation);
             for (j, &value) in code.iter().enumerate() {
                 if value != 0.0 {
-                    for (q, g) in gradient.iter_mut().zip(problem.gram_column(j)) {
+                    for (q, g) in gradient.iter_mut().zip(column(problem.gram, j)) {
                         *q -= value * g;
                     }
                 }
@@ -78,16 +83,16 @@ pub(super) fn coordinate_descent(problem: &Problem<'_>, code: &mut [f64], gradie
             }
         }
         for j in 0..code.len() {
-            let column = problem.gram_column(j);
-            if column[j] <= 0.0 {
+            let gram = column(problem.gram, j);
+            if gram[j] <= 0.0 {
                 continue;
             }
-            let free = gradient[j] + column[j] * code[j];
-            let value = free.signum() * (free.abs() - problem.lambda).max(0.0) / column[j];
+            let free = gradient[j] + gram[j] * code[j];
+            let value = free.signum() * (free.abs() - problem.lambda).max(0.0) / gram[j];
             let change = value - code[j];
             if change != 0.0 {
                 code[j] = value;
-                for (q, g) in gradient.iter_mut().zip(column) {
+                for (q, g) in gradient.iter_mut().zip(gram) {
                     *q -= change * g;
                 }
             }

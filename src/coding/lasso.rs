@@ -3,10 +3,11 @@
 use super::active_set::{ActiveSet, Problem};
 use super::cholesky::dot;
 use super::kkt::coordinate_descent;
-use super::{CodingError, Dictionary};
+use super::screen::ScreenMemory;
+use super::{CodingError, Dictionary, Signals, dispatch};
 use crate::cancel::Cancel;
-use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::MatRef;
+use std::ops::Range;
 
 /// Signals per product DᵀS: large enough for the product to run at full speed, small enough for it to stay in cache.
 const BLOCK: usize = 512;
@@ -14,6 +15,8 @@ const BLOCK: usize = 512;
 const CANCEL_EVERY: usize = 32;
 /// Optimality is met to this share of λ (plus the rounding of the products): max_j |d_jᵀ(s − Da)| ≤ λ (1 + 1e-9).
 const KKT_TOLERANCE: f64 = 1e-9;
+/// Coordinate descent, which comes last, may leave this many times as much.
+const FALL_BACK: f64 = 1e3;
 /// Below this share of ‖s‖² the residual is computed in full, because its short form would lose digits.
 const SMALL_RESIDUAL: f64 = 1e-4;
 
@@ -46,13 +49,13 @@ pub struct CodeScore {
 /// Memory that coding reuses from call to call; the results do not depend on what it was used for before.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
-    correlations: Vec<f64>,
+    screen: ScreenMemory,
     set: ActiveSet,
-    order: Vec<(usize, usize)>,
     code: Vec<f64>,
-    gradient: Vec<f64>,
     residual: Vec<f64>,
-    arena: Vec<(usize, f64)>,
+    /// Codes of all signals, in the order they were found.
+    arena: Vec<(u32, f64)>,
+    /// Where each signal's code begins and ends in `arena`, and what it cost; in the caller's order.
     solved: Vec<(usize, usize, CodeScore)>,
 }
 
@@ -84,40 +87,49 @@ pub fn encode_with(
     lambda: f64,
     cancel: &Cancel,
 ) -> Result<Codes, CodingError> {
-    let n = signals.ncols();
+    encode_signals(workspace, dictionary, &Signals::new(signals)?, lambda, cancel)
+}
+
+/// As [`encode_with`], for signals made ready once and coded under many dictionaries.
+pub fn encode_signals(
+    workspace: &mut Workspace,
+    dictionary: &Dictionary,
+    signals: &Signals<'_>,
+    lambda: f64,
+    cancel: &Cancel,
+) -> Result<Codes, CodingError> {
+    workspace.run(dictionary, signals, lambda, cancel)?;
+    let n = signals.len();
     let mut codes = Codes {
         offsets: Vec::with_capacity(n + 1),
+        atoms: Vec::with_capacity(workspace.arena.len()),
+        values: Vec::with_capacity(workspace.arena.len()),
         objective: Vec::with_capacity(n),
         residual2: Vec::with_capacity(n),
-        ..Codes::default()
     };
     codes.offsets.push(0);
-    run(workspace, dictionary, signals, lambda, cancel, |code, score| {
-        for &(atom, value) in code {
-            // L atoms of M values each are in memory, so their number fits 32 bits on any machine of today.
-            codes.atoms.push(atom as u32);
+    for &(start, end, score) in &workspace.solved {
+        for &(atom, value) in &workspace.arena[start..end] {
+            codes.atoms.push(atom);
             codes.values.push(value);
         }
         codes.offsets.push(codes.atoms.len());
         codes.objective.push(score.objective);
         codes.residual2.push(score.residual2);
-    })?;
+    }
     Ok(codes)
 }
 
-/// As [`encode_with`], but keeps only what each signal cost: N scores in the order of the signals.
-pub fn score_with(
+/// As [`encode_signals`], but keeps only what each signal cost: N scores in the caller's order of the signals.
+pub fn score_signals(
     workspace: &mut Workspace,
     dictionary: &Dictionary,
-    signals: MatRef<'_, f64>,
+    signals: &Signals<'_>,
     lambda: f64,
     cancel: &Cancel,
 ) -> Result<Vec<CodeScore>, CodingError> {
-    let mut scores = Vec::with_capacity(signals.ncols());
-    run(workspace, dictionary, signals, lambda, cancel, |_, score| {
-        scores.push(score)
-    })?;
-    Ok(scores)
+    workspace.run(dictionary, signals, lambda, cancel)?;
+    Ok(workspace.solved.iter().map(|&(_, _, score)| score).collect())
 }
 
 pub(super) fn check_lambda(lambda: f64) -> Result<(), CodingError> {
@@ -132,7 +144,8 @@ pub(super) fn check_lambda(lambda: f64) -> Result<(), CodingError> {
 }
 
 /// Column `j` of a column-major matrix.
-pub(super) fn column(matrix: MatRef<'_, f64>, j: usize) -> &[f64] {
+#[inline(always)]
+pub(super) fn column<T>(matrix: MatRef<'_, T>, j: usize) -> &[T] {
     // Callers make sure of the layout; an empty slice would be met by the checks of dimensions in front.
     matrix
         .col(j)
@@ -149,135 +162,113 @@ pub(super) fn with_column_major<T>(signals: MatRef<'_, f64>, work: impl FnOnce(M
     }
 }
 
-fn run(
-    workspace: &mut Workspace,
-    dictionary: &Dictionary,
-    signals: MatRef<'_, f64>,
-    lambda: f64,
-    cancel: &Cancel,
-    mut sink: impl FnMut(&[(usize, f64)], CodeScore),
-) -> Result<(), CodingError> {
-    check_lambda(lambda)?;
-    if signals.nrows() != dictionary.dimension() {
-        return Err(CodingError::DimensionMismatch {
-            signature: signals.nrows(),
-            atoms: dictionary.dimension(),
-        });
-    }
-    with_column_major(signals, |signals| {
-        workspace.set.reset(dictionary.len());
-        for first in (0..signals.ncols()).step_by(BLOCK) {
-            let width = BLOCK.min(signals.ncols() - first);
-            let block = signals.subcols(first, width);
-            workspace.code_block(dictionary, block, first, lambda, cancel)?;
-            for &(start, end, score) in &workspace.solved {
-                sink(&workspace.arena[start..end], score);
-            }
-        }
-        Ok(())
-    })
-}
-
 impl Workspace {
-    /// Codes up to [`BLOCK`] signals into `arena` and `solved`; `first` is the number of the block's first signal.
-    fn code_block(
+    /// Codes all signals into `arena` and `solved`.
+    fn run(
         &mut self,
         dictionary: &Dictionary,
-        signals: MatRef<'_, f64>,
-        first: usize,
+        signals: &Signals<'_>,
         lambda: f64,
         cancel: &Cancel,
     ) -> Result<(), CodingError> {
-        cancel.check()?;
-        let (atoms, width) = (dictionary.len(), signals.ncols());
-        let mut correlations = std::mem::take(&mut self.correlations);
-        correlations.resize(atoms * width, 0.0);
-        let product = MatMut::from_column_major_slice_mut(&mut correlations, atoms, width);
-        matmul(
-            product,
-            Accum::Replace,
-            dictionary.atoms().transpose(),
-            signals,
-            1.0,
-            Par::Seq,
-        );
-
-        // Signals alike share the atom they correlate with most.
-        self.order.clear();
-        for i in 0..width {
-            self.order.push((largest(&correlations[i * atoms..][..atoms]), i));
+        check_lambda(lambda)?;
+        if signals.dimension() != dictionary.dimension() {
+            return Err(CodingError::DimensionMismatch {
+                signature: signals.dimension(),
+                atoms: dictionary.dimension(),
+            });
         }
-        self.order.sort_unstable();
-
+        self.set.reset(dictionary.len());
         self.arena.clear();
         self.solved.clear();
-        self.solved.resize(width, (0, 0, CodeScore::default()));
-        for n in 0..width {
-            if n % CANCEL_EVERY == 0 {
-                cancel.check()?;
-            }
-            let i = self.order[n].1;
-            let signal = column(signals, i);
-            let correlation = &correlations[i * atoms..][..atoms];
-            let start = self.arena.len();
-            let score = self.code_signal(dictionary, signal, correlation, first + i, lambda)?;
-            self.solved[i] = (start, self.arena.len(), score);
+        self.solved.resize(signals.len(), (0, 0, CodeScore::default()));
+        for first in (0..signals.len()).step_by(BLOCK) {
+            cancel.check()?;
+            let block = first..signals.len().min(first + BLOCK);
+            let single = signals.single.as_ref().subcols(first, block.len());
+            dictionary
+                .screen()
+                .correlate(single, &signals.norms2[block.clone()], &mut self.screen);
+            dispatch::code_block(self, dictionary, signals, block, lambda, cancel)?;
         }
-        self.correlations = correlations;
         Ok(())
     }
 
-    /// Codes one signal, appends its code to `arena`.
-    fn code_signal(
+    /// Codes the signals `block` (places in the order), whose correlations are in `screen`.
+    #[inline(always)]
+    pub(super) fn code_block(
         &mut self,
         dictionary: &Dictionary,
-        signal: &[f64],
-        correlation: &[f64],
-        number: usize,
+        signals: &Signals<'_>,
+        block: Range<usize>,
         lambda: f64,
+        cancel: &Cancel,
+    ) -> Result<(), CodingError> {
+        let count = dictionary.len();
+        let first = block.start;
+        for k in block {
+            if k % CANCEL_EVERY == 0 {
+                cancel.check()?;
+            }
+            let norm2 = signals.norms2[k];
+            let rough = std::mem::take(&mut self.screen.correlations);
+            let problem = Problem {
+                atoms: dictionary.atoms().as_ref(),
+                gram: dictionary.gram().as_ref(),
+                rough_gram: dictionary.screen().gram.as_ref(),
+                signal: signals.signal(k),
+                norm: norm2.sqrt(),
+                rough_correlation: &rough[(k - first) * count..][..count],
+                error: self.screen.errors[k - first],
+                lambda,
+                tolerance: KKT_TOLERANCE * lambda + 1e-14 * norm2.sqrt(),
+            };
+            let number = signals.order[k];
+            let start = self.arena.len();
+            if self.set.solve(&problem) {
+                let pairs = self.set.atoms.iter().zip(&self.set.values);
+                // L atoms of M values each are in memory, so their number fits 32 bits.
+                self.arena.extend(pairs.map(|(&j, &a)| (j as u32, a)));
+            } else {
+                self.fall_back(&problem, number)?;
+            }
+            let score = self.score(&problem, norm2, start, number)?;
+            self.solved[number] = (start, self.arena.len(), score);
+            self.screen.correlations = rough;
+        }
+        Ok(())
+    }
+
+    /// Sorts the code that starts at `start` and says what it costs.
+    #[inline(always)]
+    fn score(
+        &mut self,
+        problem: &Problem<'_>,
+        norm2: f64,
+        start: usize,
+        number: usize,
     ) -> Result<CodeScore, CodingError> {
-        let norm2 = dot(signal, signal);
-        if !norm2.is_finite() {
-            return Err(CodingError::NotFinite { what: "signature" });
-        }
-        let problem = Problem {
-            gram: dictionary.gram().as_ref(),
-            correlation,
-            lambda,
-            tolerance: KKT_TOLERANCE * lambda + 1e-14 * norm2.sqrt(),
-        };
-        let start = self.arena.len();
-        if self.set.solve(&problem) {
-            let pairs = self.set.atoms.iter().zip(&self.set.values);
-            self.arena.extend(pairs.map(|(&j, &a)| (j, a)));
-        } else {
-            self.fall_back(&problem, number)?;
-        }
         let code = &mut self.arena[start..];
         code.sort_unstable_by_key(|&(j, _)| j);
         let (mut norm1, mut product) = (0.0, 0.0);
         for &(j, a) in code.iter() {
             norm1 += a.abs();
-            product += correlation[j] * a;
+            product += self.set.correlation(problem, j as usize) * a;
         }
         // At the optimum aᵀGa = cᵀa − λ‖a‖₁.
-        let mut residual2 = norm2 - product - lambda * norm1;
+        let mut residual2 = norm2 - product - problem.lambda * norm1;
         if residual2 < SMALL_RESIDUAL * norm2 {
             self.residual.clear();
-            self.residual.extend_from_slice(signal);
+            self.residual.extend_from_slice(problem.signal);
             for &(j, a) in code.iter() {
-                for (r, d) in self
-                    .residual
-                    .iter_mut()
-                    .zip(column(dictionary.atoms().as_ref(), j))
-                {
+                for (r, d) in self.residual.iter_mut().zip(column(problem.atoms, j as usize)) {
                     *r -= a * d;
                 }
             }
             residual2 = dot(&self.residual, &self.residual);
         }
         let score = CodeScore {
-            objective: 0.5 * residual2 + lambda * norm1,
+            objective: 0.5 * residual2 + problem.lambda * norm1,
             residual2,
             nonzeros: code.len(),
         };
@@ -291,41 +282,31 @@ impl Workspace {
     }
 
     /// Where the active set from the neighbour's code failed: once more from nothing, then coordinate descent.
+    #[cold]
+    #[inline(never)]
     fn fall_back(&mut self, problem: &Problem<'_>, number: usize) -> Result<(), CodingError> {
-        self.set.reset(problem.correlation.len());
-        let solved = self.set.solve(problem);
-        if !solved {
-            self.code.clear();
-            self.code.resize(problem.correlation.len(), 0.0);
-            for (&j, &a) in self.set.atoms.iter().zip(&self.set.values) {
-                self.code[j] = a;
-            }
-            let violation = coordinate_descent(problem, &mut self.code, &mut self.gradient);
-            let accepted = violation <= 1e3 * problem.tolerance;
-            if !accepted {
-                return Err(CodingError::NotConverged {
-                    signal: number,
-                    violation,
-                });
-            }
-            let code = self.code.iter().enumerate().filter(|(_, a)| **a != 0.0);
-            self.arena.extend(code.map(|(j, &a)| (j, a)));
-            self.set.reset(problem.correlation.len());
+        let count = problem.rough_correlation.len();
+        self.set.reset(count);
+        if self.set.solve(problem) {
+            let pairs = self.set.atoms.iter().zip(&self.set.values);
+            self.arena.extend(pairs.map(|(&j, &a)| (j as u32, a)));
             return Ok(());
         }
-        let pairs = self.set.atoms.iter().zip(&self.set.values);
-        self.arena.extend(pairs.map(|(&j, &a)| (j, a)));
+        self.code.clear();
+        self.code.resize(count, 0.0);
+        for (&j, &a) in self.set.atoms.iter().zip(&self.set.values) {
+            self.code[j] = a;
+        }
+        let violation = coordinate_descent(problem, &mut self.code);
+        if violation > FALL_BACK * problem.tolerance {
+            return Err(CodingError::NotConverged {
+                signal: number,
+                violation,
+            });
+        }
+        let code = self.code.iter().enumerate().filter(|(_, a)| **a != 0.0);
+        self.arena.extend(code.map(|(j, &a)| (j as u32, a)));
+        self.set.reset(count);
         Ok(())
     }
-}
-
-/// Where the largest magnitude is; the first of equals.
-fn largest(values: &[f64]) -> usize {
-    let mut best = (0, -1.0);
-    for (j, value) in values.iter().enumerate() {
-        if value.abs() > best.1 {
-            best = (j, value.abs());
-        }
-    }
-    best.0
 }

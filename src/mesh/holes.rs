@@ -12,7 +12,12 @@ const NO_AREA: f64 = 1e-12;
 /// The new vertices are appended, so the indices of the old ones stay. The area is that before anything is closed.
 /// Fan faces run against their neighbours' direction, as on a consistently oriented surface. A loop whose whole fan
 /// has no area (a slit) stays.
-pub(super) fn fill_small_holes(vertices: &mut Vec<[f64; 3]>, faces: &mut Vec<[u32; 3]>, below: f64) -> usize {
+pub(super) fn fill_small_holes(
+    vertices: &mut Vec<[f64; 3]>,
+    faces: &mut Vec<[u32; 3]>,
+    boundary: &[[u32; 2]],
+    below: f64,
+) -> usize {
     if below.is_nan() || below <= 0.0 {
         return 0;
     }

@@ -36,7 +36,7 @@ pub fn read(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, MeshError> {
 /// A backslash before a line end continues the statement on the next line: both become blanks.
 fn join_continued_lines(bytes: &[u8]) -> Cow<'_, [u8]> {
     let continued = |w: &[u8]| w[0] == b'\\' && (w[1] == b'\n' || w[1] == b'\r');
-    if !bytes.windows(2).any(continued) {
+    if !bytes.contains(&b'\\') || !bytes.windows(2).any(continued) {
         return Cow::Borrowed(bytes);
     }
     let mut joined = bytes.to_vec();

@@ -159,7 +159,7 @@ mod tests {
     proptest! {
         /// Well-formed ascii text reads as stl_io reads it.
         #[test]
-        fn ascii_agrees_with_stl_io(triangles in prop::collection::vec([[-100i32..100; 3]; 3], 1..40)) {
+        fn ascii_agrees_with_stl_io(triangles in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-100i32..100)), 1..40)) {
             let mut text = String::from("solid a name facet\n");
             for t in &triangles {
                 text += "facet normal 0 0 1\nouter loop\n";

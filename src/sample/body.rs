@@ -192,15 +192,17 @@ fn field(solid: &Solid, p: Vec3) -> f64 {
             let v = sub(p, centre);
             let q = frame.apply_transposed(v);
             let largest = radii[0].max(radii[1]).max(radii[2]);
-            let ball = norm(v) - largest;
+            let smallest = radii[0].min(radii[1]).min(radii[2]);
+            let ball = (norm(v) - largest).max(-smallest);
             let f = norm([q[0] / radii[0], q[1] / radii[1], q[2] / radii[2]]);
             let slope = norm([
                 q[0] / (radii[0] * radii[0]),
                 q[1] / (radii[1] * radii[1]),
                 q[2] / (radii[2] * radii[2]),
             ]);
-            // f (f − 1) / |∇| is the distance to first order; far from a flat ellipsoid it is too small, and there
-            // the distance to the ball around it is the better bound.
+            // f (f − 1) / |∇| is the distance to first order. Far outside a flat ellipsoid it is too small; there the
+            // distance to the ball around it is better. Deep inside it goes below the smallest half-axis, the
+            // greatest depth there is.
             if slope > 0.0 {
                 (f * (f - 1.0) / slope).max(ball)
             } else {

@@ -142,7 +142,9 @@ impl Species {
             if !is_sphere_if_closed(fine.vertices.len(), &fine.faces) {
                 continue;
             }
-            let mesh = remesh(&body, &fine, vertices);
+            let Some(mesh) = remesh(&body, &fine, vertices) else {
+                continue;
+            };
             if (min..=max).contains(&mesh.vertices.len()) && is_sphere(mesh.vertices.len(), &mesh.faces) {
                 let mut mesh = shuffled(mesh, &mut rng);
                 if upright {

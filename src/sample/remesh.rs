@@ -1,28 +1,32 @@
 //! Fine marching surface → as many well-shaped triangles as asked for.
 
 use super::body::Body;
-use super::topology::{next, twins};
+use super::topology::{is_sphere, next, twins};
 use super::vector::{Vec3, add, add_scaled, cross, dot, norm, scale, sub};
 use crate::mesh::TriangleSoup;
 use meshopt::SimplifyOptions;
 
 /// Rounds of flipping, smoothing and projection after simplification.
 const ROUNDS: usize = 5;
+/// Simplification does not check the link condition, so it may pinch a limb three edges around; another target takes
+/// another order of collapses and mostly does not.
+const TARGETS: [f64; 4] = [1.0, 0.985, 1.015, 0.97];
 
 /// Simplifies the surface to about `vertices` vertices by quadric error, then evens it out: edges are flipped towards
 /// the Delaunay condition, vertices move towards their neighbours' centre within the tangent plane and back onto
-/// the body. The result need not be a sphere even when the input was one; the caller checks.
-pub fn remesh(body: &Body, fine: &TriangleSoup, vertices: usize) -> TriangleSoup {
-    let mut mesh = simplify(fine, vertices);
+/// the body. Returns `None` when simplification pinched a thin limb, whatever number near `vertices` was tried.
+pub fn remesh(body: &Body, fine: &TriangleSoup, vertices: usize) -> Option<TriangleSoup> {
+    let mut mesh = TARGETS.iter().find_map(|share| {
+        let mesh = simplify(fine, (share * vertices as f64) as usize);
+        is_sphere(mesh.vertices.len(), &mesh.faces).then_some(mesh)
+    })?;
     project(body, &mut mesh.vertices, 2);
     for _ in 0..ROUNDS {
-        if let Some(mut twins) = twins(&mesh.faces) {
-            flip(&mut mesh, &mut twins);
-        }
+        flip(&mut mesh);
         smooth(&mut mesh);
         project(body, &mut mesh.vertices, 1);
     }
-    mesh
+    Some(mesh)
 }
 
 /// Quadric-error simplification on single-precision copies of the coordinates; unused vertices are dropped.
@@ -111,7 +115,10 @@ fn cotangent(apex: Vec3, a: Vec3, b: Vec3) -> f64 {
 
 /// One sweep of edge flips: an edge whose opposite angles add up to more than half a turn (negative sum of
 /// cotangents) is replaced by the other diagonal, unless that folds the surface or the edge exists already.
-fn flip(mesh: &mut TriangleSoup, twins: &mut [u32]) {
+fn flip(mesh: &mut TriangleSoup) {
+    let Some(mut twins) = twins(&mesh.faces) else {
+        return;
+    };
     for h in 0..twins.len() {
         let t = twins[h] as usize;
         if t < h {
@@ -135,7 +142,7 @@ fn flip(mesh: &mut TriangleSoup, twins: &mut [u32]) {
             let n = normal(v, f);
             dot(n, mean) <= 0.5 * norm(n) * norm(mean)
         });
-        if folds || joined(faces, twins, hp, d) || degree(twins, h) < 4 || degree(twins, t) < 4 {
+        if folds || joined(faces, &twins, hp, d) || degree(&twins, h) < 4 || degree(&twins, t) < 4 {
             continue;
         }
         // Face of h becomes c, d, b and face of t becomes d, c, a; the new edge runs c → d and d → c.

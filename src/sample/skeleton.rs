@@ -189,6 +189,14 @@ impl Skeleton {
         }
     }
 
+    /// Multiplies the ranges of a bone's joint by a factor.
+    pub(super) fn stiffen(&mut self, bone: usize, factor: f64) {
+        let range = &mut self.bones[bone].range;
+        for r in [&mut range.pitch, &mut range.yaw, &mut range.roll] {
+            *r = r.map(|angle| factor * angle);
+        }
+    }
+
     /// Radius of the thinnest part: what the polygoniser has to resolve.
     pub(super) fn thinnest(&self) -> f64 {
         self.parts

@@ -300,7 +300,7 @@ fn elephant() -> Skeleton {
         stance: [0.33, 0.33],
         fore: leg,
         hind: leg,
-        neck: [0.32, 30.0, 0.34, 0.3],
+        neck: [0.36, 30.0, 0.34, 0.22],
         neck_bones: 1,
         head: Head {
             skull: [0.3, 0.36, 0.33],
@@ -315,6 +315,11 @@ fn elephant() -> Skeleton {
     };
     let (mut s, at) = body.build();
     let [_, y, z] = at.skull;
+    // A short neck and wide ears leave the head little room to turn.
+    s.stiffen(at.head, 0.4);
+    if let Some(neck) = s.bones[at.head].parent {
+        s.stiffen(neck, 0.3);
+    }
     // Trunk: down from the face, curling forwards at the end.
     let trunk = [
         ([0.0, y - 0.08, z + 0.24], 0.17),
@@ -332,16 +337,16 @@ fn elephant() -> Skeleton {
     );
     for side in Side::BOTH {
         let tusk = [
-            ([0.17, y - 0.2, z + 0.2], 0.06),
-            ([0.24, y - 0.48, z + 0.5], 0.042),
+            ([0.2, y - 0.18, z + 0.14], 0.075),
+            ([0.37, y - 0.5, z + 0.58], 0.06),
         ];
         s.chain(at.head, side, &tusk, &[Range::default()]);
     }
     s.ellipsoid_pair(
         at.head,
-        [0.46, y - 0.03, z - 0.12],
-        [0.33, 0.4, 0.085],
-        [0.0, 35.0, -12.0],
+        [0.48, y + 0.06, z - 0.06],
+        [0.34, 0.42, 0.11],
+        [0.0, 32.0, -8.0],
     );
     s
 }
@@ -382,7 +387,7 @@ fn giraffe() -> Skeleton {
     let (mut s, at) = body.build();
     let [_, y, z] = at.skull;
     for side in Side::BOTH {
-        let horn = [([0.045, y + 0.05, z], 0.04), ([0.055, y + 0.2, z - 0.05], 0.042)];
+        let horn = [([0.055, y + 0.05, z], 0.04), ([0.11, y + 0.2, z - 0.05], 0.042)];
         s.chain(at.head, side, &horn, &[Range::default()]);
     }
     s
@@ -422,6 +427,10 @@ fn rabbit() -> Skeleton {
         swing: 22.0,
     };
     let (mut s, at) = body.build();
+    // It sits on its haunches: the long hind feet have little room under the belly.
+    for &bone in at.limbs[2..].iter().flatten() {
+        s.stiffen(bone, 0.5);
+    }
     s.ellipsoid(at.hips, [0.0, 0.27, -0.25], [0.045, 0.045, 0.045], [0.0; 3]);
     s
 }
@@ -592,7 +601,7 @@ fn spider() -> Skeleton {
         }
     }
     for side in Side::BOTH {
-        let fang = [([0.05, 0.28, 0.26], 0.042), ([0.06, 0.2, 0.34], 0.03)];
+        let fang = [([0.055, 0.27, 0.24], 0.042), ([0.085, 0.17, 0.31], 0.032)];
         s.chain(front, side, &fang, &[range([-15.0, 15.0], FIXED, FIXED)]);
     }
     s
@@ -616,8 +625,8 @@ fn kangaroo() -> Skeleton {
             ([0.2, 0.035, 0.3], 0.036),
         ];
         let ranges = [
-            range([-30.0, 25.0], FIXED, [-2.0, 10.0]),
-            range([-15.0, 35.0], FIXED, FIXED),
+            range([-20.0, 25.0], FIXED, [-2.0, 10.0]),
+            range([-8.0, 24.0], FIXED, FIXED),
             range([-25.0, 15.0], FIXED, FIXED),
         ];
         s.chain(hips, side, &leg, &ranges);

@@ -70,18 +70,19 @@ impl Geometry {
         let limits = &document.limits;
         let (base, count) = self.part(document, primitive, positions)?;
         limits.check_vertices(self.vertex_count())?;
-        let indices = match primitive.indices {
-            Some(accessor) => {
-                let most = limits.max_faces.saturating_mul(3).saturating_add(2);
-                document.numbers(accessor, Type::Scalar, most, "indices", |x| x as u32)?
-            }
-            None => (0..count as u32).collect(),
+        let listed = match primitive.indices {
+            Some(accessor) => document.count(accessor)?,
+            None => count,
         };
         let drawn = match mode {
-            Mode::Triangles => indices.len() / 3,
-            _ => indices.len().saturating_sub(2),
+            Mode::Triangles => listed / 3,
+            _ => listed.saturating_sub(2),
         };
         limits.check_faces(self.faces.len().saturating_add(drawn))?;
+        let indices = match primitive.indices {
+            Some(accessor) => document.numbers(accessor, Type::Scalar, listed, "indices", |x| x as u32)?,
+            None => (0..count as u32).collect(),
+        };
         if let Some(at) = indices.iter().position(|&k| k as usize >= count) {
             let face = match mode {
                 Mode::Triangles => at / 3,

@@ -6,6 +6,7 @@ use super::primitive::Geometry;
 use crate::mesh::{MeshError, TriangleSoup};
 use gltf::json::accessor::Type;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// How one node is placed relative to its parent, and the weights of its mesh's morph targets.
 #[derive(Clone, Debug)]
@@ -168,11 +169,13 @@ impl<'d, 'a> Scene<'d, 'a> {
                 continue;
             };
             let skin = document.root.nodes[node].skin.map(|s| s.value());
-            if !scene.meshes.contains_key(&mesh) {
-                scene.meshes.insert(mesh, Geometry::open(document, mesh)?);
+            if let Entry::Vacant(slot) = scene.meshes.entry(mesh) {
+                slot.insert(Geometry::open(document, mesh)?);
             }
-            if let Some(skin) = skin.filter(|s| !scene.skins.contains_key(s)) {
-                scene.skins.insert(skin, Skin::open(document, skin)?);
+            if let Some(skin) = skin
+                && let Entry::Vacant(slot) = scene.skins.entry(skin)
+            {
+                slot.insert(Skin::open(document, skin)?);
             }
             let geometry = &scene.meshes[&mesh];
             vertices = vertices.saturating_add(geometry.vertex_count());

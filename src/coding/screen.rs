@@ -1,0 +1,168 @@
+//! Products DᵀS at single precision with a bound on their error: enough to see which atoms cannot be active.
+//!
+//! Atoms are smooth and coherent, so few directions hold nearly all of them: D = QR + T with orthonormal Q (M × r) and
+//! small columns of T. Then d_jᵀs = r_jᵀ(Qᵀs) + t_jᵀs, and as t_j is orthogonal to Q the part left out is at most
+//! ‖t_j‖ · ‖s − QQᵀs‖, a product of two small numbers.
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+
+/// The largest ‖t_j‖ of an atom against the largest atom.
+const TAIL: f64 = 1e-3;
+/// The projection is used where it takes at most this share of the operations.
+const WORTHWHILE: f64 = 0.7;
+
+/// More than what products lose that are too small for single precision.
+const UNDERFLOW: f64 = 1e-34;
+
+/// A dictionary at single precision.
+#[derive(Clone, Debug)]
+pub(super) struct Screen {
+    /// Q, M × r; `None` where D itself is multiplied.
+    basis: Option<Mat<f32>>,
+    /// QᵀD, r × L, or D.
+    atoms: Mat<f32>,
+    /// DᵀD, L × L.
+    pub gram: Mat<f32>,
+    /// max ‖t_j‖, 0 without projection.
+    tail: f64,
+}
+
+/// What [`Screen::correlate`] reuses.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ScreenMemory {
+    projections: Vec<f32>,
+    /// Dᵀs of each signal of the block, L values each.
+    pub correlations: Vec<f32>,
+    /// Bound on the error of each signal's correlations.
+    pub errors: Vec<f64>,
+}
+
+impl Screen {
+    pub fn new(atoms: &Mat<f64>, gram: &Mat<f64>) -> Self {
+        let (m, l) = (atoms.nrows(), atoms.ncols());
+        let single =
+            |matrix: &Mat<f64>| Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] as f32);
+        let largest = (0..l).map(|j| gram[(j, j)]).fold(0.0, f64::max);
+        let most = (WORTHWHILE * (m * l) as f64 / (m + l).max(1) as f64) as usize;
+        if let Some(pivots) = spanning_atoms(gram, TAIL * TAIL * largest, most.min(m)) {
+            let chosen = Mat::from_fn(m, pivots.len(), |i, k| atoms[(i, pivots[k])]);
+            let basis = chosen.qr().compute_thin_Q();
+            let mut projected = Mat::zeros(basis.ncols(), l);
+            matmul(
+                projected.as_mut(),
+                Accum::Replace,
+                basis.transpose(),
+                atoms.as_ref(),
+                1.0,
+                Par::Seq,
+            );
+            // ‖t_j‖² = ‖d_j‖² − ‖r_j‖², with its rounding on top.
+            let tail2 = (0..l)
+                .map(|j| gram[(j, j)] - projected.col(j).squared_norm_l2())
+                .fold(0.0, f64::max);
+            return Self {
+                tail: (tail2 + 1e-13 * largest).sqrt(),
+                atoms: single(&projected),
+                basis: Some(single(&basis)),
+                gram: single(gram),
+            };
+        }
+        Self {
+            basis: None,
+            atoms: single(atoms),
+            gram: single(gram),
+            tail: 0.0,
+        }
+    }
+
+    /// Approximate Dᵀs for every column of `signals` (M × N), with ‖s‖² in `norms2`.
+    pub fn correlate(&self, signals: MatRef<'_, f32>, norms2: &[f64], memory: &mut ScreenMemory) {
+        let (m, n, l) = (signals.nrows(), signals.ncols(), self.atoms.ncols());
+        let r = self.atoms.nrows();
+        memory.correlations.resize(l * n, 0.0);
+        memory.errors.clear();
+        // Rounding in sums of m terms grows with √m (Higham and Mary 2019); 8 standard deviations.
+        let rounding = 8.0 * f64::from(f32::EPSILON) * ((m as f64).sqrt() + (r as f64).sqrt());
+        let product = MatMut::from_column_major_slice_mut(&mut memory.correlations, l, n);
+        let Some(basis) = &self.basis else {
+            matmul(
+                product,
+                Accum::Replace,
+                self.atoms.transpose(),
+                signals,
+                1.0,
+                Par::Seq,
+            );
+            memory
+                .errors
+                .extend(norms2.iter().map(|norm2| rounding * norm2.sqrt()));
+            return;
+        };
+        memory.projections.resize(r * n, 0.0);
+        let projections = MatMut::from_column_major_slice_mut(&mut memory.projections, r, n);
+        matmul(
+            projections,
+            Accum::Replace,
+            basis.transpose(),
+            signals,
+            1.0,
+            Par::Seq,
+        );
+        let projections = MatRef::from_column_major_slice(&memory.projections, r, n);
+        matmul(
+            product,
+            Accum::Replace,
+            self.atoms.transpose(),
+            projections,
+            1.0,
+            Par::Seq,
+        );
+        for (norm2, projection) in norms2.iter().zip(memory.projections.chunks_exact(r)) {
+            let kept: f32 = projection.iter().map(|y| y * y).sum();
+            // What single precision cannot tell from zero counts as left out.
+            let left_out = (norm2 - f64::from(kept)).max(0.0) + 1e-4 * norm2;
+            memory
+                .errors
+                .push(self.tail * left_out.sqrt() + rounding * norm2.sqrt());
+        }
+    }
+}
+
+/// Atoms that span all atoms to within `tail2` of squared distance, by pivoted Cholesky of their Gram matrix; `None`
+/// where `most` do not suffice.
+fn spanning_atoms(gram: &Mat<f64>, tail2: f64, most: usize) -> Option<Vec<usize>> {
+    let l = gram.nrows();
+    let mut left: Vec<f64> = (0..l).map(|j| gram[(j, j)]).collect();
+    let mut pivots = Vec::new();
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    loop {
+        let mut pivot = 0;
+        for j in 1..l {
+            if left[j] > left[pivot] {
+                pivot = j;
+            }
+        }
+        if l == 0 || left[pivot] <= tail2 {
+            return (!pivots.is_empty()).then_some(pivots);
+        }
+        if pivots.len() == most {
+            return None;
+        }
+        let mut column = gram.col_as_slice(pivot).to_vec();
+        for other in &columns {
+            let weight = other[pivot];
+            for (c, o) in column.iter_mut().zip(other) {
+                *c -= weight * o;
+            }
+        }
+        let scale = left[pivot].sqrt().recip();
+        for (c, rest) in column.iter_mut().zip(&mut left) {
+            *c *= scale;
+            *rest -= *c * *c;
+        }
+        left[pivot] = 0.0;
+        pivots.push(pivot);
+        columns.push(column);
+    }
+}
