@@ -7,7 +7,7 @@ use super::metrics;
 use super::problem::Problem;
 use super::problem_from::index_empty;
 use super::state::Parts;
-use super::upload::UploadedMesh;
+use super::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
 use crate::model::ClassId;
 use crate::pipeline::{Stage, describe_query, rank};

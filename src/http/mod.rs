@@ -19,6 +19,7 @@ mod routes;
 pub mod serve;
 pub mod state;
 pub mod upload;
+pub mod uploaded;
 
 pub use config::ServiceConfig;
 pub use router::router;
