@@ -44,6 +44,7 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
         TableComponent::TopBorder,
         TableComponent::BottomBorder,
         TableComponent::HorizontalLines,
+        TableComponent::MiddleIntersections,
     ] {
         table.remove_style(line);
     }

@@ -104,6 +104,8 @@ fn unpack_tar(reader: impl Read, limits: &ArchiveLimits) -> Result<Vec<Member>, 
             collected.count()?;
         }
     }
+    // The entries end before the stream does; what follows may be where a compressed one turns out to be cut short.
+    std::io::copy(&mut archive.into_inner(), &mut std::io::sink()).map_err(|e| broken("tar", e))?;
     Ok(collected.members)
 }
 

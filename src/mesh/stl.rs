@@ -61,6 +61,7 @@ fn read_binary(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, MeshError>
             ),
         ));
     };
+    limits.check_faces(count)?;
     let found = (bytes.len() - HEADER) / TRIANGLE;
     if found < count {
         return Err(MeshError::truncated(
@@ -68,7 +69,6 @@ fn read_binary(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, MeshError>
             format!("its header promises {count} triangles, but there are bytes for {found}"),
         ));
     }
-    limits.check_faces(count)?;
     // stl_io takes a header that begins with `solid` for ascii, so it gets the file with an empty header.
     let mut file = vec![0u8; 80];
     file.extend_from_slice(&bytes[80..HEADER + count * TRIANGLE]);

