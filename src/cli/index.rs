@@ -133,16 +133,16 @@ impl Report {
             .collect();
         let mut text = output::table(&["class", ">shapes added"], &rows);
         if self.existing > 0 {
-            text += &format!("\n{} shapes were there already", self.existing);
+            text += &format!("\nshapes that were there already: {}", self.existing);
         }
         if !self.refused.is_empty() {
-            text += &format!("\n{} files were refused, see above", self.refused.len());
+            text += &format!("\nfiles refused: {}, see above", self.refused.len());
         }
         if learnt {
             let relearned = self.job["result"]["relearned"].as_array().map_or(0, Vec::len);
             let generation = &self.job["generation"];
             text += &format!(
-                "\n{relearned} classes learnt, index generation {generation}, {:.1} s",
+                "\nclasses learnt: {relearned}; index generation {generation}, {:.1} s",
                 self.seconds
             );
             for skipped in self.job["result"]["skipped"].as_array().into_iter().flatten() {

@@ -1,7 +1,7 @@
 //! Answers on stdout: lines and tables for people, one JSON value per line for machines.
 
 use super::CliError;
-use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use comfy_table::{CellAlignment, ContentArrangement, Table, TableComponent, presets};
 use serde::Serialize;
 use std::io::Write;
 
@@ -40,7 +40,15 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    table.to_string()
+    for line in [
+        TableComponent::TopBorder,
+        TableComponent::BottomBorder,
+        TableComponent::HorizontalLines,
+    ] {
+        table.remove_style(line);
+    }
+    let lines: Vec<String> = table.lines().map(|line| line.trim_end().to_owned()).collect();
+    lines.join("\n")
 }
 
 #[cfg(test)]
@@ -59,9 +67,10 @@ mod tests {
         let cat = text.lines().find(|l| l.contains("cat")).unwrap();
         let elephant = text.lines().find(|l| l.contains("elephant")).unwrap();
         assert!(
-            cat.trim_end().ends_with("0.35") && elephant.trim_end().ends_with("10.5"),
+            cat.ends_with("0.35") && elephant.ends_with("10.5") && cat.len() == elephant.len(),
             "{text}"
         );
         assert!(!text.contains('>'), "{text}");
+        assert_eq!(text.lines().count(), 4, "a header, a line, two rows: {text}");
     }
 }

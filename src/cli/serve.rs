@@ -42,11 +42,16 @@ pub fn run(args: &ServeArgs, json: bool) -> Result<(), CliError> {
     service::run_until(config.service(), service::interrupted(), |address| {
         tracing::info!(%address, "listening");
         let url = format!("http://{address}");
-        if json {
+        let told = if json {
             output::json(&json!({ "listening": url }))
         } else {
             output::line(&format!("listening on {url}"))
-        }
+        };
+        // A service whose stdout nobody reads serves all the same.
+        told.or_else(|error| match error {
+            CliError::OutputClosed => Ok(()),
+            other => Err(other),
+        })
     })?;
     tracing::info!("stopped");
     Ok(())

@@ -40,6 +40,10 @@ pub struct ZooArgs {
     /// Most vertices of a mesh
     #[arg(long, value_name = "COUNT", default_value_t = ZooOptions::default().max_vertices)]
     pub max_vertices: usize,
+
+    /// Leave the creatures standing, y up, in their own units; otherwise each is turned, moved and scaled at random.
+    #[arg(long)]
+    pub upright: bool,
 }
 
 /// A creature in a file format.
@@ -116,6 +120,7 @@ pub fn run(args: &ZooArgs, as_json: bool) -> Result<(), CliError> {
     let options = ZooOptions {
         min_vertices: args.min_vertices,
         max_vertices: args.max_vertices,
+        upright: args.upright,
     };
     let specimens = specimens(args.classes, args.poses, args.seed, args.format, &options)?;
     for specimen in &specimens {

@@ -124,3 +124,58 @@ impl Factor {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Gram matrix of the points' Gaussian kernel: positive definite, neighbours 0.9 alike.
+    fn gram(i: usize, j: usize) -> f64 {
+        (-0.1 * (i as f64 - j as f64).powi(2)).exp()
+    }
+
+    fn push(factor: &mut Factor, kept: &mut Vec<usize>, point: usize) {
+        let mut column: Vec<f64> = kept.iter().map(|&i| gram(i, point)).collect();
+        assert!(factor.push(&mut column, 1.0));
+        kept.push(point);
+    }
+
+    #[test]
+    fn rows_come_and_go_and_the_factor_still_solves() {
+        let (mut factor, mut kept) = (Factor::default(), Vec::new());
+        for point in 0..24 {
+            push(&mut factor, &mut kept, point * 7 % 24);
+            if point % 3 == 2 {
+                let k = point * 5 % kept.len();
+                factor.remove(k);
+                kept.remove(k);
+            }
+            let wanted: Vec<f64> = kept.iter().map(|&i| i as f64 - 3.0).collect();
+            let mut x: Vec<f64> = kept
+                .iter()
+                .map(|&i| kept.iter().zip(&wanted).map(|(&j, w)| gram(i, j) * w).sum())
+                .collect();
+            factor.solve_lower(&mut x);
+            factor.solve_upper(&mut x);
+            for (found, wanted) in x.iter().zip(&wanted) {
+                assert!((found - wanted).abs() < 1e-6, "{found} against {wanted}");
+            }
+        }
+        assert_eq!(factor.len(), 16);
+        for k in [15, 0, 7] {
+            factor.remove(k);
+        }
+        assert_eq!(factor.len(), 13);
+    }
+
+    #[test]
+    fn a_dependent_row_is_refused_and_leaves_the_factor_as_it_was() {
+        let mut factor = Factor::default();
+        assert!(factor.push(&mut [], 1.0));
+        assert!(!factor.push(&mut [1.0], 1.0));
+        assert!(!factor.push(&mut [0.0], 0.0));
+        assert!(!factor.push(&mut [f64::NAN], 1.0));
+        assert_eq!(factor.len(), 1);
+        assert!(factor.push(&mut [0.5], 1.0));
+    }
+}

@@ -2,7 +2,8 @@
 
 use super::CodingError;
 use super::screen::Screen;
-use faer::Mat;
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::{Accum, Mat, Par};
 
 /// A learnt dictionary D with its Gram matrix.
 #[derive(Clone, Debug)]
@@ -31,9 +32,16 @@ impl Dictionary {
                 });
             }
         }
-        let gram = atoms.transpose() * &atoms;
+        let gram = gram(&atoms);
         let screen = Screen::new(&atoms, &gram);
         Ok(Self { atoms, gram, screen })
+    }
+
+    /// As [`Dictionary::new`] for atoms known to be sound, and quicker: for coding a few hundred signals and no more.
+    pub(super) fn for_few_signals(atoms: Mat<f64>) -> Self {
+        let gram = gram(&atoms);
+        let screen = Screen::direct(&atoms, &gram);
+        Self { atoms, gram, screen }
     }
 
     /// D, M × L, one atom per column.
@@ -64,4 +72,29 @@ impl Dictionary {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+}
+
+/// DᵀD: half of it is computed, the other mirrored.
+fn gram(atoms: &Mat<f64>) -> Mat<f64> {
+    use BlockStructure::{Rectangular, TriangularLower};
+    let l = atoms.ncols();
+    let mut gram = Mat::zeros(l, l);
+    let (left, right) = (atoms.transpose(), atoms.as_ref());
+    matmul(
+        gram.as_mut(),
+        TriangularLower,
+        Accum::Replace,
+        left,
+        Rectangular,
+        right,
+        Rectangular,
+        1.0,
+        Par::Seq,
+    );
+    for j in 0..l {
+        for i in j + 1..l {
+            gram[(j, i)] = gram[(i, j)];
+        }
+    }
+    gram
 }

@@ -1,6 +1,7 @@
 //! Where learning starts: distinct signals, and atoms drawn from them.
 
 use super::cholesky::dot;
+use super::dispatch::{Kernel, fastest};
 use super::lasso::column;
 use faer::MatRef;
 use rand::Rng;
@@ -14,14 +15,36 @@ const JITTER: f64 = 1e-3;
 
 /// Numbers of the signals (columns, M × N) that are farther than 1e-9 of the largest norm from every one kept before
 /// them, ascending. Signals are compared only where their projections on one direction are that near, so this costs
-/// one pass over the data and a sort.
-pub(super) fn distinct(signals: MatRef<'_, f64>) -> Vec<usize> {
+/// one pass over the data and a sort. `None` where a signal is not finite.
+pub(super) fn distinct(signals: MatRef<'_, f64>) -> Option<Vec<usize>> {
+    fastest(Distinct { signals })
+}
+
+struct Distinct<'a> {
+    signals: MatRef<'a, f64>,
+}
+
+impl Kernel for Distinct<'_> {
+    type Output = Option<Vec<usize>>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        find_distinct(self.signals)
+    }
+}
+
+#[inline(always)]
+fn find_distinct(signals: MatRef<'_, f64>) -> Option<Vec<usize>> {
     let direction = direction(signals.nrows());
     let mut projections = Vec::with_capacity(signals.ncols());
     let mut largest: f64 = 0.0;
     for i in 0..signals.ncols() {
         let signal = column(signals, i);
-        largest = largest.max(dot(signal, signal));
+        let norm2 = dot(signal, signal);
+        if !norm2.is_finite() {
+            return None;
+        }
+        largest = largest.max(norm2);
         projections.push((dot(signal, &direction), i));
     }
     let near = SAME * largest.sqrt();
@@ -40,7 +63,7 @@ pub(super) fn distinct(signals: MatRef<'_, f64>) -> Vec<usize> {
     }
     let mut numbers: Vec<usize> = kept.into_iter().map(|(_, i)| i).collect();
     numbers.sort_unstable();
-    numbers
+    Some(numbers)
 }
 
 /// A fixed vector of unit norm with no regularity that signals could share.

@@ -100,3 +100,51 @@ pub(super) fn coordinate_descent(problem: &Problem<'_>, code: &mut [f64]) -> f64
     }
     left
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cancel::Cancel;
+    use crate::coding::encode;
+    use faer::Mat;
+
+    #[test]
+    fn coordinate_descent_ends_where_the_active_set_does() {
+        let wave = |i: usize, j: usize| ((i * (j + 2)) as f64 * 0.37).sin() / 5.0;
+        let dictionary = Dictionary::new(Mat::from_fn(20, 12, wave)).unwrap();
+        let signals = Mat::from_fn(20, 1, |i, _| (i as f64 * 0.9).cos() + 0.3);
+        let codes = encode(&dictionary, signals.as_ref(), 0.05, &Cancel::new()).unwrap();
+        let problem = Problem {
+            atoms: dictionary.atoms().as_ref(),
+            gram: dictionary.gram().as_ref(),
+            rough_gram: faer::MatRef::from_column_major_slice(&[], 0, 0),
+            signal: signals.col_as_slice(0),
+            norm: signals.norm_l2(),
+            rough_correlation: &[],
+            error: 0.0,
+            lambda: 0.05,
+            tolerance: 1e-11,
+        };
+        let mut code = vec![0.0; 12];
+        assert!(coordinate_descent(&problem, &mut code) <= 1e-11);
+        let nonzero: Vec<u32> = (0..12).filter(|&j| code[j as usize] != 0.0).collect();
+        assert_eq!(nonzero, codes.atoms);
+        assert!(nonzero.len() > 3);
+        for (&j, value) in codes.atoms.iter().zip(&codes.values) {
+            assert!((code[j as usize] - value).abs() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn a_wrong_code_is_found_out() {
+        let dictionary = Dictionary::new(Mat::identity(3, 3)).unwrap();
+        let signals = Mat::from_fn(3, 1, |i, _| i as f64);
+        let mut codes = encode(&dictionary, signals.as_ref(), 0.25, &Cancel::new()).unwrap();
+        assert!(kkt_violation(&dictionary, signals.as_ref(), 0.25, &codes).unwrap()[0] <= 1e-15);
+        codes.values[0] += 0.125;
+        assert_eq!(
+            kkt_violation(&dictionary, signals.as_ref(), 0.25, &codes).unwrap(),
+            [0.125]
+        );
+    }
+}

@@ -2,9 +2,10 @@
 
 use super::active_set::{ActiveSet, Problem};
 use super::cholesky::dot;
+use super::dispatch::{Kernel, fastest};
 use super::kkt::coordinate_descent;
 use super::screen::ScreenMemory;
-use super::{CodingError, Dictionary, Signals, dispatch};
+use super::{CodingError, Dictionary, Signals};
 use crate::cancel::Cancel;
 use faer::MatRef;
 use std::ops::Range;
@@ -162,6 +163,32 @@ pub(super) fn with_column_major<T>(signals: MatRef<'_, f64>, work: impl FnOnce(M
     }
 }
 
+struct CodeBlock<'a> {
+    workspace: &'a mut Workspace,
+    dictionary: &'a Dictionary,
+    signals: &'a Signals<'a>,
+    block: Range<usize>,
+    lambda: f64,
+    cancel: &'a Cancel,
+}
+
+impl Kernel for CodeBlock<'_> {
+    type Output = Result<(), CodingError>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self {
+            workspace,
+            dictionary,
+            signals,
+            block,
+            lambda,
+            cancel,
+        } = self;
+        workspace.code_block(dictionary, signals, block, lambda, cancel)
+    }
+}
+
 impl Workspace {
     /// Codes all signals into `arena` and `solved`.
     fn run(
@@ -189,14 +216,21 @@ impl Workspace {
             dictionary
                 .screen()
                 .correlate(single, &signals.norms2[block.clone()], &mut self.screen);
-            dispatch::code_block(self, dictionary, signals, block, lambda, cancel)?;
+            fastest(CodeBlock {
+                workspace: self,
+                dictionary,
+                signals,
+                block,
+                lambda,
+                cancel,
+            })?;
         }
         Ok(())
     }
 
     /// Codes the signals `block` (places in the order), whose correlations are in `screen`.
     #[inline(always)]
-    pub(super) fn code_block(
+    fn code_block(
         &mut self,
         dictionary: &Dictionary,
         signals: &Signals<'_>,

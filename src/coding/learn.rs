@@ -1,6 +1,5 @@
 //! Online dictionary learning (method, step 7; Mairal, Bach, Ponce, Sapiro 2010, Algorithms 1 and 2).
 
-use super::cholesky::dot;
 use super::dictionary_update::DictionaryUpdate;
 use super::initialise::{distinct, initial_atoms};
 use super::lasso::{check_lambda, column, with_column_major};
@@ -55,7 +54,7 @@ pub struct LearnReport {
     pub atoms: usize,
     /// Atoms replaced because they were unused or nearly equal to another.
     pub replaced: usize,
-    /// Mean Lasso objective under the initial atoms, over all signals or a seeded draw of 1000 where there are more.
+    /// Mean Lasso objective under the initial atoms, over all signals or a seeded draw of 500 where there are more.
     pub initial_objective: f64,
     /// Mean Lasso objective of the same signals under the learnt atoms.
     pub objective: f64,
@@ -63,7 +62,7 @@ pub struct LearnReport {
 
 /// Signals, drawn with the seed, on which the initial and the final objective are measured; all of them where there
 /// are no more.
-const MEASURED: usize = 1000;
+const MEASURED: usize = 500;
 
 /// Learns a dictionary from the columns of `signals` (M × N). `progress(done, total)` is called after every
 /// mini-batch.
@@ -71,8 +70,8 @@ const MEASURED: usize = 1000;
 /// Initial atoms are distinct training signals, jittered. Mini-batches run through all signals in random order, again
 /// and again; each is coded under the current atoms, enters the running sums A = Σ aaᵀ and B = Σ saᵀ, and the atoms
 /// move by one pass of block-coordinate descent with ‖d_j‖ ≤ 1. Before mini-batch t the sums are scaled by
-/// β = (θ + 1 − η)/(θ + 1), η the batch size, θ = tη for t < η and η² + t − η after (Section 3.4.3 of the paper), so
-/// codes found under early atoms fade. Atoms nearly equal to another (coherence above 1 − 1e-6) and atoms no signal
+/// β², β = (θ + 1 − η)/(θ + 1), η the batch size, θ = tη for t < η and η² + t − η after (Sections 3.4.1 and 3.4.3 of
+/// the paper, ρ = 2), so codes found under early atoms fade. Atoms nearly equal to another (coherence above 1 − 1e-6) and atoms no signal
 /// has used for long give way to the signals coded worst. At the end the atoms are rounded to values that an `f32`
 /// holds; ‖d_j‖ ≤ 1 then holds to 1e-6. If that did not lower the mean objective, the initial atoms are returned.
 /// The result depends on the signals, the parameters and nothing else.
@@ -115,14 +114,10 @@ fn learn_columns(
     cancel: &Cancel,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<(Dictionary, LearnReport), CodingError> {
-    for i in 0..signals.ncols() {
-        let signal = column(signals, i);
-        if !dot(signal, signal).is_finite() {
-            return Err(CodingError::NotFinite { what: "signature" });
-        }
-    }
+    let Some(distinct) = distinct(signals) else {
+        return Err(CodingError::NotFinite { what: "signature" });
+    };
     let mut random = ChaCha8Rng::seed_from_u64(parameters.seed);
-    let distinct = distinct(signals);
     let atoms = parameters.atoms.min(distinct.len());
     let initial = initial_atoms(signals, &distinct, atoms, &mut random);
     let mut order: Vec<usize> = (0..signals.ncols()).collect();
@@ -136,7 +131,7 @@ fn learn_columns(
         let scores = score_signals(&mut workspace, dictionary, &measured, parameters.lambda, cancel)?;
         Ok(scores.iter().map(|score| score.objective).sum::<f64>() / scores.len() as f64)
     };
-    let first = Dictionary::new(rounded(&initial, signals.nrows()))?;
+    let first = Dictionary::for_few_signals(rounded(&initial, signals.nrows()));
     let initial_objective = mean_objective(&first)?;
 
     let mut update = DictionaryUpdate::new(initial, signals.nrows(), parameters.batch);
@@ -155,7 +150,7 @@ fn learn_columns(
             next += 1;
         }
         let batch = gather(signals, &drawn);
-        let dictionary = update.dictionary()?;
+        let dictionary = update.dictionary();
         let codes = encode_with(
             &mut workspace,
             &dictionary,
@@ -170,7 +165,7 @@ fn learn_columns(
     let mut dictionary = Dictionary::new(rounded(update.atoms(), signals.nrows()))?;
     let mut objective = mean_objective(&dictionary)?;
     if objective > initial_objective {
-        (dictionary, objective) = (first, initial_objective);
+        (dictionary, objective) = (Dictionary::new(first.atoms().clone())?, initial_objective);
     }
     let report = LearnReport {
         signals: signals.ncols(),

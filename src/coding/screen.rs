@@ -4,6 +4,7 @@
 //! small columns of T. Then d_jᵀs = r_jᵀ(Qᵀs) + t_jᵀs, and as t_j is orthogonal to Q the part left out is at most
 //! ‖t_j‖ · ‖s − QQᵀs‖, a product of two small numbers.
 
+use super::dispatch::{Kernel, fastest};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
@@ -38,41 +39,62 @@ pub(super) struct ScreenMemory {
     pub errors: Vec<f64>,
 }
 
-impl Screen {
-    pub fn new(atoms: &Mat<f64>, gram: &Mat<f64>) -> Self {
-        let (m, l) = (atoms.nrows(), atoms.ncols());
-        let single =
-            |matrix: &Mat<f64>| Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] as f32);
-        let largest = (0..l).map(|j| gram[(j, j)]).fold(0.0, f64::max);
-        let most = (WORTHWHILE * (m * l) as f64 / (m + l).max(1) as f64) as usize;
-        if let Some(pivots) = spanning_atoms(gram, TAIL * TAIL * largest, most.min(m)) {
-            let chosen = Mat::from_fn(m, pivots.len(), |i, k| atoms[(i, pivots[k])]);
-            let basis = chosen.qr().compute_thin_Q();
-            let mut projected = Mat::zeros(basis.ncols(), l);
-            matmul(
-                projected.as_mut(),
-                Accum::Replace,
-                basis.transpose(),
-                atoms.as_ref(),
-                1.0,
-                Par::Seq,
-            );
-            // ‖t_j‖² = ‖d_j‖² − ‖r_j‖², with its rounding on top.
-            let tail2 = (0..l)
-                .map(|j| gram[(j, j)] - projected.col(j).squared_norm_l2())
-                .fold(0.0, f64::max);
-            return Self {
-                tail: (tail2 + 1e-13 * largest).sqrt(),
-                atoms: single(&projected),
-                basis: Some(single(&basis)),
-                gram: single(gram),
-            };
+fn single(matrix: &Mat<f64>) -> Mat<f32> {
+    let mut rounded = Mat::zeros(matrix.nrows(), matrix.ncols());
+    for j in 0..matrix.ncols() {
+        for (to, from) in rounded.col_as_slice_mut(j).iter_mut().zip(matrix.col_as_slice(j)) {
+            *to = *from as f32;
         }
+    }
+    rounded
+}
+
+impl Screen {
+    /// Without projection: for a dictionary that codes few signals.
+    pub fn direct(atoms: &Mat<f64>, gram: &Mat<f64>) -> Self {
         Self {
             basis: None,
             atoms: single(atoms),
             gram: single(gram),
             tail: 0.0,
+        }
+    }
+
+    /// With projection where it pays: for a dictionary that codes many signals.
+    pub fn new(atoms: &Mat<f64>, gram: &Mat<f64>) -> Self {
+        let (m, l) = (atoms.nrows(), atoms.ncols());
+        let largest = (0..l).map(|j| gram[(j, j)]).fold(0.0, f64::max);
+        let most = (WORTHWHILE * (m * l) as f64 / (m + l).max(1) as f64) as usize;
+        let Some(pivots) = fastest(SpanningAtoms {
+            gram,
+            tail2: TAIL * TAIL * largest,
+            most: most.min(m),
+        }) else {
+            return Self::direct(atoms, gram);
+        };
+        let mut chosen = Mat::zeros(m, pivots.len());
+        for (k, &j) in pivots.iter().enumerate() {
+            chosen.col_as_slice_mut(k).copy_from_slice(atoms.col_as_slice(j));
+        }
+        let basis = chosen.qr().compute_thin_Q();
+        let mut projected = Mat::zeros(basis.ncols(), l);
+        matmul(
+            projected.as_mut(),
+            Accum::Replace,
+            basis.transpose(),
+            atoms.as_ref(),
+            1.0,
+            Par::Seq,
+        );
+        // ‖t_j‖² = ‖d_j‖² − ‖r_j‖², with its rounding on top.
+        let tail2 = (0..l)
+            .map(|j| gram[(j, j)] - projected.col(j).squared_norm_l2())
+            .fold(0.0, f64::max);
+        Self {
+            tail: (tail2 + 1e-13 * largest).sqrt(),
+            atoms: single(&projected),
+            basis: Some(single(&basis)),
+            gram: single(gram),
         }
     }
 
@@ -96,7 +118,7 @@ impl Screen {
             );
             memory
                 .errors
-                .extend(norms2.iter().map(|norm2| rounding * norm2.sqrt()));
+                .extend(norms2.iter().map(|norm2| rounding * norm2.sqrt() + UNDERFLOW));
             return;
         };
         memory.projections.resize(r * n, 0.0);
@@ -124,45 +146,57 @@ impl Screen {
             let left_out = (norm2 - f64::from(kept)).max(0.0) + 1e-4 * norm2;
             memory
                 .errors
-                .push(self.tail * left_out.sqrt() + rounding * norm2.sqrt());
+                .push(self.tail * left_out.sqrt() + rounding * norm2.sqrt() + UNDERFLOW);
         }
     }
 }
 
 /// Atoms that span all atoms to within `tail2` of squared distance, by pivoted Cholesky of their Gram matrix; `None`
 /// where `most` do not suffice.
-fn spanning_atoms(gram: &Mat<f64>, tail2: f64, most: usize) -> Option<Vec<usize>> {
-    let l = gram.nrows();
-    let mut left: Vec<f64> = (0..l).map(|j| gram[(j, j)]).collect();
-    let mut pivots = Vec::new();
-    let mut columns: Vec<Vec<f64>> = Vec::new();
-    loop {
-        let mut pivot = 0;
-        for j in 1..l {
-            if left[j] > left[pivot] {
-                pivot = j;
+struct SpanningAtoms<'a> {
+    gram: &'a Mat<f64>,
+    tail2: f64,
+    most: usize,
+}
+
+impl Kernel for SpanningAtoms<'_> {
+    type Output = Option<Vec<usize>>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self { gram, tail2, most } = self;
+        let l = gram.nrows();
+        let mut left: Vec<f64> = (0..l).map(|j| gram[(j, j)]).collect();
+        let mut pivots = Vec::new();
+        let mut columns: Vec<Vec<f64>> = Vec::new();
+        loop {
+            let mut pivot = 0;
+            for j in 1..l {
+                if left[j] > left[pivot] {
+                    pivot = j;
+                }
             }
-        }
-        if l == 0 || left[pivot] <= tail2 {
-            return (!pivots.is_empty()).then_some(pivots);
-        }
-        if pivots.len() == most {
-            return None;
-        }
-        let mut column = gram.col_as_slice(pivot).to_vec();
-        for other in &columns {
-            let weight = other[pivot];
-            for (c, o) in column.iter_mut().zip(other) {
-                *c -= weight * o;
+            if l == 0 || left[pivot] <= tail2 {
+                return (!pivots.is_empty()).then_some(pivots);
             }
+            if pivots.len() == most {
+                return None;
+            }
+            let mut column = gram.col_as_slice(pivot).to_vec();
+            for other in &columns {
+                let weight = other[pivot];
+                for (c, o) in column.iter_mut().zip(other) {
+                    *c -= weight * o;
+                }
+            }
+            let scale = left[pivot].sqrt().recip();
+            for (c, rest) in column.iter_mut().zip(&mut left) {
+                *c *= scale;
+                *rest -= *c * *c;
+            }
+            left[pivot] = 0.0;
+            pivots.push(pivot);
+            columns.push(column);
         }
-        let scale = left[pivot].sqrt().recip();
-        for (c, rest) in column.iter_mut().zip(&mut left) {
-            *c *= scale;
-            *rest -= *c * *c;
-        }
-        left[pivot] = 0.0;
-        pivots.push(pivot);
-        columns.push(column);
     }
 }

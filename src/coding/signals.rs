@@ -1,8 +1,9 @@
 //! Signals made ready to be coded, once for however many dictionaries.
 
+use super::CodingError;
 use super::cholesky::dot;
+use super::dispatch::{Kernel, fastest};
 use super::lasso::column;
-use super::{CodingError, dispatch};
 use faer::{Mat, MatRef};
 
 /// Length of the summary by which neighbours are found.
@@ -50,7 +51,10 @@ impl<'a> Signals<'a> {
         };
         let signals = values.get();
         let (m, n) = (signals.nrows(), signals.ncols());
-        let order = dispatch::chain(&summaries(signals), m);
+        let order = fastest(Chain {
+            summaries: &summaries(signals),
+            length: m,
+        });
         let mut single = Mat::zeros(m, n);
         let mut norms2 = Vec::with_capacity(n);
         for (k, &i) in order.iter().enumerate() {
@@ -106,7 +110,7 @@ impl Values<'_> {
 }
 
 /// What neighbours are told by: sums over [`SUMMARY`] equal stretches of a signal.
-pub(super) type Summary = [f32; SUMMARY];
+type Summary = [f32; SUMMARY];
 
 fn summaries(signals: MatRef<'_, f64>) -> Vec<Summary> {
     let stretch = signals.nrows().div_ceil(SUMMARY).max(1);
@@ -123,8 +127,22 @@ fn summaries(signals: MatRef<'_, f64>) -> Vec<Summary> {
 
 /// The greedy chain through all summaries, from the first. The window grows with the length M of a signal, as what a
 /// better neighbour saves does.
+struct Chain<'a> {
+    summaries: &'a [Summary],
+    length: usize,
+}
+
+impl Kernel for Chain<'_> {
+    type Output = Vec<usize>;
+
+    #[inline(always)]
+    fn run(self) -> Vec<usize> {
+        chain(self.summaries, self.length)
+    }
+}
+
 #[inline(always)]
-pub(super) fn chain(summaries: &[Summary], length: usize) -> Vec<usize> {
+fn chain(summaries: &[Summary], length: usize) -> Vec<usize> {
     let count = summaries.len();
     let mut order = Vec::with_capacity(count);
     let Some(first) = summaries.first() else {

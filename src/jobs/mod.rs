@@ -24,6 +24,7 @@ use jiff::Timestamp;
 use std::collections::{HashMap, VecDeque};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
@@ -67,6 +68,7 @@ struct Inner {
     /// Told of every change of `state` the worker or a shutdown waits for.
     changed: Condvar,
     depth: AtomicUsize,
+    worker: Mutex<Option<JoinHandle<()>>>,
 }
 
 #[derive(Default)]
@@ -124,6 +126,14 @@ impl Inner {
                 .unwrap_or_else(PoisonError::into_inner)
                 .0;
         }
+        drop(state);
+        // It has nothing left to do but to let go of the store, which must be free when this returns.
+        let worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(worker) = worker
+            && worker.join().is_err()
+        {
+            tracing::error!("the worker thread panicked");
+        }
         true
     }
 
@@ -155,13 +165,15 @@ impl Jobs {
             state: Mutex::default(),
             changed: Condvar::new(),
             depth: AtomicUsize::new(0),
+            worker: Mutex::default(),
         });
         worker::requeue_interrupted(&inner)?;
         let for_worker = Arc::clone(&inner);
-        std::thread::Builder::new()
+        let worker = std::thread::Builder::new()
             .name("jobs".to_owned())
             .spawn(move || worker::run(&for_worker))
             .map_err(|e| no_worker(e.to_string()))?;
+        *inner.worker.lock().unwrap_or_else(PoisonError::into_inner) = Some(worker);
         let jobs = Self {
             _last: Arc::new(StopOnDrop(Arc::clone(&inner))),
             inner,

@@ -45,6 +45,7 @@ pub(super) fn requeue_interrupted(inner: &Inner) -> Result<(), JobError> {
 
 /// The thread's body: until it is told to stop.
 pub(super) fn run(inner: &Arc<Inner>) {
+    let _end = Stopped(inner);
     while let Some((id, channel, cancel)) = next(inner) {
         let ended =
             catch_unwind(AssertUnwindSafe(|| work(inner, &channel, &cancel))).unwrap_or_else(|panic| {
@@ -57,9 +58,16 @@ pub(super) fn run(inner: &Arc<Inner>) {
             });
         finish(inner, id, &channel, ended);
     }
-    let mut state = inner.state();
-    state.stopped = true;
-    inner.changed.notify_all();
+}
+
+/// Says that the worker has ended, however it did.
+struct Stopped<'a>(&'a Inner);
+
+impl Drop for Stopped<'_> {
+    fn drop(&mut self) {
+        self.0.state().stopped = true;
+        self.0.changed.notify_all();
+    }
 }
 
 /// Waits for the next job and marks it as running; `None` at shutdown.

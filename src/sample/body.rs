@@ -190,10 +190,10 @@ fn field(solid: &Solid, p: Vec3) -> f64 {
         }
         Solid::Ellipsoid { centre, frame, radii } => {
             let v = sub(p, centre);
-            let q = frame.apply_transposed(v);
             let largest = radii[0].max(radii[1]).max(radii[2]);
             let smallest = radii[0].min(radii[1]).min(radii[2]);
             let ball = (norm(v) - largest).max(-smallest);
+            let q = frame.apply_transposed(v);
             let f = norm([q[0] / radii[0], q[1] / radii[1], q[2] / radii[2]]);
             let slope = norm([
                 q[0] / (radii[0] * radii[0]),

@@ -17,7 +17,7 @@ const ATTEMPTS: usize = 24;
 /// Draws of angles per attempt until no two limbs are too near each other.
 const DRAWS: usize = 60;
 /// Vertices of the marching surface per vertex asked for: enough for simplification to choose well.
-const OVERSAMPLING: f64 = 3.5;
+const OVERSAMPLING: f64 = 2.7;
 /// Marching tetrahedra make about this many vertices per squared grid spacing of area.
 const VERTICES_PER_SQUARE: f64 = 4.5;
 
@@ -95,10 +95,6 @@ impl Species {
         &self.name
     }
 
-    #[doc(hidden)]
-    pub fn thinnest(&self) -> f64 {
-        self.skeleton.thinnest()
-    }
     /// The creature at rest.
     pub fn skeleton(&self) -> &Skeleton {
         &self.skeleton

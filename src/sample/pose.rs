@@ -75,14 +75,6 @@ impl Clearance {
         Self { pairs }
     }
 
-    #[doc(hidden)]
-    pub fn bad(&self, body: &Body) -> Vec<(usize, usize, f64)> {
-        self.pairs
-            .iter()
-            .copied()
-            .filter(|&(i, j, least)| body.gap(i, j) < least)
-            .collect()
-    }
     /// Whether no two parts are nearer than they may be.
     pub fn holds(&self, body: &Body) -> bool {
         self.pairs.iter().all(|&(i, j, least)| body.gap(i, j) >= least)

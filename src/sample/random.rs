@@ -57,8 +57,9 @@ fn skeleton(rng: &mut impl Rng) -> Skeleton {
     } else {
         rng.random_range(0.0..0.8)
     };
-    let thickness = rng.random_range(0.2..0.42) * girth;
-    let taper = rng.random_range(0.6..0.9);
+    let spacing = 1.4 * half / f64::from(pairs.max(2) - 1);
+    let thickness = rng.random_range(0.26..0.45) * girth.min(0.9 * spacing);
+    let taper = rng.random_range(0.75..0.95);
     let knee = rng.random_range(0.35..0.65);
     for k in 0..pairs {
         let t = if pairs == 1 {
@@ -68,16 +69,17 @@ fn skeleton(rng: &mut impl Rng) -> Skeleton {
         };
         let z = (0.7 - 1.4 * t) * half;
         let bone = if z > 0.0 { chest } else { hips };
-        legs(
-            &mut s,
-            bone,
-            z,
-            girth * flatness,
+        let limb = Limb {
+            joint: [0.75 * girth * flatness, 0.0, z],
             reach,
             splay,
-            [thickness, taper, knee],
-            pairs,
-        );
+            fan: if pairs > 2 { 1.8 } else { 1.0 },
+            foot: (0.15 * reach).min(0.4 * spacing),
+            radii: [1.0, taper, taper * taper].map(|r| r * thickness),
+            knee,
+            swing: 44.0 / f64::from(pairs + 1),
+        };
+        limb.attach(&mut s, bone);
     }
 
     let front: Vec3 = [0.0, 0.3 * girth, 0.85 * half];
@@ -114,17 +116,17 @@ fn skeleton(rng: &mut impl Rng) -> Skeleton {
             size * rng.random_range(1.0..1.5),
         ],
         muzzle: [
-            size * rng.random_range(0.9..3.0),
+            size * rng.random_range(0.9..2.4),
             0.65 * size,
             size * rng.random_range(0.3..0.55),
         ],
-        droop: rng.random_range(0.0..40.0),
+        droop: rng.random_range(0.0..25.0),
         ear: if ears {
-            [0.4 * size, size * rng.random_range(0.5..1.8), 0.25 * size]
+            [0.4 * size, size * rng.random_range(0.5..1.8), 0.32 * size]
         } else {
             [0.0; 3]
         },
-        ear_set: [rng.random_range(10.0..60.0), 0.7],
+        ear_set: [rng.random_range(10.0..60.0), 0.62],
     };
     head.attach(&mut s, above, top);
 
@@ -144,7 +146,7 @@ fn skeleton(rng: &mut impl Rng) -> Skeleton {
     }
     for _ in 0..rng.random_range(0..=2u32) {
         let (z, size) = (
-            rng.random_range(-0.6..0.6) * half,
+            rng.random_range(-0.4..0.4) * half,
             girth * rng.random_range(0.4..0.7),
         );
         let bone = if z > 0.0 { chest } else { hips };
@@ -158,46 +160,55 @@ fn skeleton(rng: &mut impl Rng) -> Skeleton {
     s
 }
 
-#[allow(clippy::too_many_arguments)]
-fn legs(
-    s: &mut Skeleton,
-    bone: usize,
-    z: f64,
-    width: f64,
+/// One pair of legs.
+struct Limb {
+    /// The left leg's joint in the trunk.
+    joint: Vec3,
+    /// Length of the leg.
     reach: f64,
+    /// From hanging down, 0, to standing out, 1.
     splay: f64,
-    [thickness, taper, knee]: [f64; 3],
-    pairs: u32,
-) {
-    let out = 0.2 + 0.8 * splay;
-    let x = 0.75 * width;
-    let points: [(Vec3, f64); 4] = [
-        ([x, 0.0, z], thickness),
-        (
-            [x + 0.7 * out * splay * reach, -(1.0 - splay) * knee * reach, z],
-            thickness * taper,
-        ),
-        (
-            [x + out * splay * reach, -(1.0 - 0.4 * splay) * reach, z],
-            thickness * taper * taper,
-        ),
-        (
-            [
-                x + out * splay * reach,
-                -(1.0 - 0.4 * splay) * reach,
-                z + 0.15 * reach,
-            ],
-            thickness * taper * taper,
-        ),
-    ];
-    let swing = 44.0 / f64::from(pairs + 1);
-    let ranges = [
-        range([-swing, swing], [-0.5 * swing, 0.5 * swing], [-4.0, 12.0]),
-        range([-8.0, 30.0], FIXED, [-8.0, 8.0]),
-        range([-10.0, 15.0], FIXED, FIXED),
-    ];
-    for side in Side::BOTH {
-        let chain = s.chain(bone, side, &points, &ranges);
-        s.walks(&chain[..2], if side == Side::Left { 0.0 } else { 0.5 });
+    /// How much further apart along the body the feet are than the joints.
+    fan: f64,
+    /// Length of the foot.
+    foot: f64,
+    /// Radii at joint, knee and foot.
+    radii: [f64; 3],
+    /// Place of the knee along the leg.
+    knee: f64,
+    /// Swing to either side, in degrees.
+    swing: f64,
+}
+
+impl Limb {
+    fn attach(&self, s: &mut Skeleton, bone: usize) {
+        let [x, y, z] = self.joint;
+        let out = (0.2 + 0.8 * self.splay) * self.splay * self.reach;
+        let (knee, foot) = (z * (1.0 + 0.7 * (self.fan - 1.0)), z * self.fan);
+        let down = (1.0 - 0.4 * self.splay) * self.reach;
+        let [r0, r1, r2] = self.radii;
+        let points: [(Vec3, f64); 4] = [
+            (self.joint, r0),
+            (
+                [
+                    x + 0.7 * out,
+                    y - (1.0 - self.splay) * self.knee * self.reach,
+                    knee,
+                ],
+                r1,
+            ),
+            ([x + out, y - down, foot], r2),
+            ([x + out, y - down, foot + self.foot], r2),
+        ];
+        let swing = self.swing;
+        let ranges = [
+            range([-swing, swing], [-0.5 * swing, 0.5 * swing], [-4.0, 12.0]),
+            range([-8.0, 30.0], FIXED, [-8.0, 8.0]),
+            range([-10.0, 15.0], FIXED, FIXED),
+        ];
+        for side in Side::BOTH {
+            let chain = s.chain(bone, side, &points, &ranges);
+            s.walks(&chain[..2], if side == Side::Left { 0.0 } else { 0.5 });
+        }
     }
 }

@@ -14,7 +14,7 @@ pub struct Range {
 }
 
 /// Shorthand for a [`Range`].
-pub(super) fn range(pitch: [f64; 2], yaw: [f64; 2], roll: [f64; 2]) -> Range {
+pub(in crate::sample) fn range(pitch: [f64; 2], yaw: [f64; 2], roll: [f64; 2]) -> Range {
     Range { pitch, yaw, roll }
 }
 
@@ -86,7 +86,7 @@ pub struct Skeleton {
 
 /// Which side of the body a limb is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Side {
+pub(in crate::sample) enum Side {
     /// x as given.
     Left,
     /// x mirrored.
@@ -94,7 +94,7 @@ pub(super) enum Side {
 }
 
 impl Side {
-    pub(super) const BOTH: [Self; 2] = [Self::Left, Self::Right];
+    pub(in crate::sample) const BOTH: [Self; 2] = [Self::Left, Self::Right];
 
     fn point(self, [x, y, z]: Vec3) -> Vec3 {
         match self {
@@ -113,7 +113,7 @@ impl Side {
 
 impl Skeleton {
     /// Adds a bone and returns its index.
-    pub(super) fn bone(&mut self, parent: Option<usize>, pivot: Vec3, range: Range) -> usize {
+    pub(in crate::sample) fn bone(&mut self, parent: Option<usize>, pivot: Vec3, range: Range) -> usize {
         self.bones.push(Bone {
             parent,
             pivot,
@@ -124,7 +124,7 @@ impl Skeleton {
     }
 
     /// Adds a tapered capsule to a bone.
-    pub(super) fn cone(&mut self, bone: usize, a: Vec3, ra: f64, b: Vec3, rb: f64) {
+    pub(in crate::sample) fn cone(&mut self, bone: usize, a: Vec3, ra: f64, b: Vec3, rb: f64) {
         self.parts.push(Part {
             bone,
             solid: Solid::Cone {
@@ -136,7 +136,7 @@ impl Skeleton {
     }
 
     /// Adds an ellipsoid to a bone; `angles` are pitch, yaw and roll of its axes in degrees.
-    pub(super) fn ellipsoid(&mut self, bone: usize, centre: Vec3, radii: Vec3, angles: Vec3) {
+    pub(in crate::sample) fn ellipsoid(&mut self, bone: usize, centre: Vec3, radii: Vec3, angles: Vec3) {
         let blend = 0.6 * radii.iter().copied().fold(f64::INFINITY, f64::min);
         self.parts.push(Part {
             bone,
@@ -150,7 +150,13 @@ impl Skeleton {
     }
 
     /// Adds an ellipsoid on each side of a bone.
-    pub(super) fn ellipsoid_pair(&mut self, bone: usize, centre: Vec3, radii: Vec3, [p, y, r]: Vec3) {
+    pub(in crate::sample) fn ellipsoid_pair(
+        &mut self,
+        bone: usize,
+        centre: Vec3,
+        radii: Vec3,
+        [p, y, r]: Vec3,
+    ) {
         self.ellipsoid(bone, centre, radii, [p, y, r]);
         self.ellipsoid(bone, Side::Right.point(centre), radii, [p, -y, -r]);
     }
@@ -158,7 +164,7 @@ impl Skeleton {
     /// Adds a chain of bones through `points` (centre and radius), one bone per segment, each turning about its
     /// first point within the range of the same place in `ranges` (the last one is repeated when there are fewer).
     /// Returns the bones' indices.
-    pub(super) fn chain(
+    pub(in crate::sample) fn chain(
         &mut self,
         parent: usize,
         side: Side,
@@ -183,14 +189,14 @@ impl Skeleton {
     }
 
     /// Puts the bones into a gait: their pitch follows a common cycle, each a little behind the one above.
-    pub(super) fn walks(&mut self, bones: &[usize], phase: f64) {
+    pub(in crate::sample) fn walks(&mut self, bones: &[usize], phase: f64) {
         for (i, &b) in bones.iter().enumerate() {
             self.bones[b].gait = Some(phase + 0.12 * i as f64);
         }
     }
 
     /// Multiplies the ranges of a bone's joint by a factor.
-    pub(super) fn stiffen(&mut self, bone: usize, factor: f64) {
+    pub(in crate::sample) fn stiffen(&mut self, bone: usize, factor: f64) {
         let range = &mut self.bones[bone].range;
         for r in [&mut range.pitch, &mut range.yaw, &mut range.roll] {
             *r = r.map(|angle| factor * angle);
@@ -198,7 +204,7 @@ impl Skeleton {
     }
 
     /// Radius of the thinnest part: what the polygoniser has to resolve.
-    pub(super) fn thinnest(&self) -> f64 {
+    pub fn thinnest(&self) -> f64 {
         self.parts
             .iter()
             .map(|p| match p.solid {

@@ -9,7 +9,7 @@ const FIXED: [f64; 2] = [0.0, 0.0];
 
 /// A leg seen from the side, from the joint in the trunk to the toe.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Leg {
+pub(in crate::sample) struct Leg {
     /// Radii at the upper joint, the knee or elbow, the ankle or wrist, and the foot.
     pub radii: [f64; 4],
     /// Heights of knee and ankle as shares of the upper joint's height.
@@ -22,7 +22,7 @@ pub(super) struct Leg {
 
 /// Head, in a frame whose z runs along the muzzle.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Head {
+pub(in crate::sample) struct Head {
     /// Half-axes of the skull: width, height, length.
     pub skull: Vec3,
     /// Length of the muzzle beyond the skull's centre, and its radii at root and tip.
@@ -37,7 +37,7 @@ pub(super) struct Head {
 
 /// Anything on four legs.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Quadruped {
+pub(in crate::sample) struct Quadruped {
     /// Distance between shoulder and hip joints.
     pub trunk: f64,
     /// Heights of the middle of chest and rump.
@@ -70,7 +70,7 @@ pub(super) struct Quadruped {
 
 /// The bones later additions hang on.
 #[derive(Clone, Debug)]
-pub(super) struct Landmarks {
+pub(in crate::sample) struct Landmarks {
     /// Rear of the trunk, the root.
     pub hips: usize,
     /// Front of the trunk.
@@ -84,14 +84,14 @@ pub(super) struct Landmarks {
 }
 
 /// A point at `length` from `from`, in the plane x = 0, at an angle above the forward horizontal.
-pub(super) fn ahead(from: Vec3, length: f64, degrees: f64) -> Vec3 {
+pub(in crate::sample) fn ahead(from: Vec3, length: f64, degrees: f64) -> Vec3 {
     let (s, c) = degrees.to_radians().sin_cos();
     add(from, [0.0, length * s, length * c])
 }
 
 impl Quadruped {
     /// Builds the creature standing still.
-    pub(super) fn build(&self) -> (Skeleton, Landmarks) {
+    pub(in crate::sample) fn build(&self) -> (Skeleton, Landmarks) {
         let mut s = Skeleton::default();
         let half = 0.5 * self.trunk;
         let (front, rear) = ([0.0, self.height[0], half], [0.0, self.height[1], -half]);
@@ -198,7 +198,7 @@ impl Leg {
 
 impl Head {
     /// Puts the head on top of a neck. Returns its bone and the middle of the skull.
-    pub(super) fn attach(&self, s: &mut Skeleton, neck: usize, at: Vec3) -> (usize, Vec3) {
+    pub(in crate::sample) fn attach(&self, s: &mut Skeleton, neck: usize, at: Vec3) -> (usize, Vec3) {
         let [w, h, l] = self.skull;
         let bone = s.bone(Some(neck), at, range([-25.0, 25.0], [-35.0, 35.0], [-15.0, 15.0]));
         let skull = ahead(at, 0.5 * l, -self.droop);
@@ -224,7 +224,7 @@ impl Head {
 
 impl Skeleton {
     /// A tail of equal bones, at an angle above the backward horizontal. Returns its bones.
-    pub(super) fn tail(
+    pub(in crate::sample) fn tail(
         &mut self,
         bone: usize,
         root: Vec3,
@@ -247,7 +247,7 @@ impl Skeleton {
 
 /// Anything upright on two legs with two arms. Heights are above the ground.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Biped {
+pub(in crate::sample) struct Biped {
     /// Heights of hip joints, shoulder joints and chin.
     pub height: [f64; 3],
     /// Half-distance between the shoulder joints and between the hip joints.
@@ -272,7 +272,7 @@ pub(super) struct Biped {
 
 impl Biped {
     /// Builds the creature standing with its arms held off the body.
-    pub(super) fn build(&self) -> (Skeleton, Landmarks) {
+    pub(in crate::sample) fn build(&self) -> (Skeleton, Landmarks) {
         let mut s = Skeleton::default();
         let [hip, shoulder, chin] = self.height;
         let up = 90.0 - self.lean;

@@ -29,13 +29,20 @@ dispatch! {
 
 #[inline(always)]
 fn inner_body<const FMA: bool, const B: usize>(x: &[[f64; B]], y: &[[f64; B]]) -> Small<B> {
+    // Up to eight rows of the product at a time, so that the sums stay in registers.
+    const GROUP: usize = 8;
     let mut out = [[0.0; B]; B];
-    for (a, b) in x.iter().zip(y) {
-        for k in 0..B {
-            for r in 0..B {
-                out[k][r] = fused::<FMA>(a[k], b[r], out[k][r]);
+    for first in (0..B).step_by(GROUP) {
+        let size = GROUP.min(B - first);
+        let mut sums = [[0.0; B]; GROUP];
+        for (a, b) in x.iter().zip(y) {
+            for (sum, a) in sums.iter_mut().take(size).zip(&a[first..]) {
+                for r in 0..B {
+                    sum[r] = fused::<FMA>(*a, b[r], sum[r]);
+                }
             }
         }
+        out[first..first + size].copy_from_slice(&sums[..size]);
     }
     out
 }

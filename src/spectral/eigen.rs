@@ -60,6 +60,11 @@ pub fn smallest_eigenpairs(
     eigenpairs_of(&s, n, options, cancel)
 }
 
+/// Peak memory of [`smallest_eigenpairs`] for a mesh of so many vertices, in bytes: for admission control, not exact.
+pub fn estimated_bytes(vertices: usize, n: usize) -> usize {
+    solve::estimated_bytes(vertices, n)
+}
+
 /// The `n` smallest eigenpairs of an operator, null space first; rows in the order of `s`.
 pub(super) fn eigenpairs_of(
     s: &Normalised,

@@ -14,8 +14,7 @@ use super::loss::Loss;
 use super::normalised::NullSpace;
 use super::shift_invert::Factor;
 use super::simd::Simd;
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatMut, Par};
+use faer::Mat;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -234,7 +233,7 @@ impl<'a, const B: usize> Lanczos<'a, B> {
     /// Each is OP applied to the Ritz vector over its Ritz value, which costs no further solve because the recurrence
     /// knows OP V: x = V y + V_{m+1} (R_last y_last) / θ.
     pub fn vectors(&self, ritz: &Ritz, chosen: &[usize]) -> Vec<f64> {
-        let (n, m, k) = (self.current.len(), self.dimension(), chosen.len());
+        let (m, k) = (self.dimension(), chosen.len());
         let mut y = Mat::<f64>::zeros(m + B, k);
         for (q, &c) in chosen.iter().enumerate() {
             let tail = ritz.tail.col(c);
@@ -247,16 +246,7 @@ impl<'a, const B: usize> Lanczos<'a, B> {
                 y[(m + i, q)] = tail[i] / ritz.theta[c] * unit;
             }
         }
-        let mut x = vec![0.0; n * k];
-        matmul(
-            MatMut::from_row_major_slice_mut(&mut x, n, k),
-            Accum::Replace,
-            self.basis.matrix().subcols(0, m + B),
-            y.as_ref(),
-            1.0,
-            Par::Seq,
-        );
-        x
+        self.basis.times(y.as_ref())
     }
 }
 

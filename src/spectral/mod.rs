@@ -18,6 +18,6 @@ mod simd;
 mod solve;
 
 pub use doubled::{dirichlet_eigenpairs, doubled_eigenpairs};
-pub use eigen::{EigenOptions, Eigenpairs, smallest_eigenpairs};
+pub use eigen::{EigenOptions, Eigenpairs, estimated_bytes, smallest_eigenpairs};
 pub use error::SpectralError;
 pub use laplacian::{Operators, assemble};

@@ -33,31 +33,45 @@ const DENSE_LAST_RESORT: usize = 6000;
 /// Eigenvalues below this share of the largest are zero as far as double precision can tell.
 pub const ZERO: f64 = 1e-9;
 
-/// Accepted ‖XᵀX − I‖_F.
-const ORTHOGONALITY: f64 = 1e-8;
+/// Accepted ‖XᵀX − I‖_F. Re-orthogonalisation keeps it near 1e-9; what it can cost the tolerance is its own size.
+const ORTHOGONALITY: f64 = 1e-7;
 
-/// The block size for a mesh of n vertices: small blocks need less subspace, large ones make better use of memory.
-pub fn block_size(n: usize) -> usize {
-    match n {
-        0..6000 => 4,
-        6000..50_000 => 8,
-        _ => 16,
-    }
-}
+/// Block sizes in the order they are tried. Small blocks need the smallest subspace; a block finds at most its own size
+/// of copies of an eigenvalue in exact arithmetic, so larger ones follow when the count does not come out.
+const BLOCKS: [usize; 4] = [4, 8, 16, 32];
 
 /// Columns of the subspace tried first for `wanted` pairs.
-pub fn first_subspace(wanted: usize, block: usize) -> usize {
+fn first_subspace(wanted: usize, block: usize) -> usize {
     let ratio = match block {
-        0..=4 => 1.66,
+        0..=4 => 1.64,
         5..=8 => 1.86,
         _ => 2.25,
     };
     ((ratio * wanted as f64) as usize + 4 * block).next_multiple_of(block)
 }
 
-/// Whether a problem of n unknowns is solved densely at once.
-pub fn is_dense(n: usize, wanted: usize) -> bool {
-    n < 3 * first_subspace(wanted, 4) / 2 + 100
+/// Whether a problem of n unknowns is solved densely at once: where the subspace would be most of the space.
+fn is_dense(n: usize, wanted: usize) -> bool {
+    n < 6 * first_subspace(wanted, BLOCKS[0]) / 5 + 40
+}
+
+/// Bytes at the peak of a solve for `wanted` pairs of n unknowns, from the sizes of what is held at once.
+pub fn estimated_bytes(n: usize, wanted: usize) -> usize {
+    let wanted = wanted.min(n);
+    let vectors = 8 * n * wanted;
+    if is_dense(n, wanted) {
+        // The matrix, its eigenvectors, as much workspace, and the result twice.
+        return 8 * 4 * n * n + 2 * vectors;
+    }
+    let m = first_subspace(wanted, BLOCKS[0]);
+    // The factor of a surface mesh has about 5 log2(n) entries per row, held twice while it is packed; S and its
+    // permuted copy take another 40 numbers per row.
+    let factor = 8 * n * (10 * n.ilog2() as usize + 40);
+    // Projected problem: T, its eigenvectors, workspace, coefficients.
+    let projected = 8 * 5 * m * m;
+    // First the basis with the row-major vectors, then those with the result.
+    let basis = 8 * n * (m + 8 * BLOCKS[0]);
+    factor + projected + vectors + basis.max(vectors)
 }
 
 /// The `wanted` smallest eigenpairs outside the null space, checked.
@@ -129,9 +143,8 @@ fn sparse_pairs(
         options,
         cancel,
     };
-    let smallest_block = block_size(s.n);
     let mut last = None;
-    for block in [4, 8, 16, 32].into_iter().filter(|&b| b >= smallest_block) {
+    for block in BLOCKS {
         let attempt = match block {
             4 => problem.attempt::<4>(),
             8 => problem.attempt::<8>(),

@@ -47,7 +47,9 @@ fn every_line_of_the_tour_runs() {
         .unwrap();
     // Strict mode turns every line into an assertion; --fail-with-body makes curl one of them.
     let mut script = String::from(
-        "set -euxo pipefail\ncurl() { command curl --fail-with-body --silent --show-error \"$@\"; }\n",
+        "set -euxo pipefail\n\
+         trap 'kill $(jobs -p) 2>/dev/null || true' EXIT\n\
+         curl() { command curl --fail-with-body --silent --show-error \"$@\"; }\n",
     );
     for line in tour() {
         script += &line.replace(ADDRESS, &free.to_string());

@@ -4,6 +4,7 @@ use faer::Mat;
 use serde::Deserialize;
 use shapelex::cancel::Cancel;
 use shapelex::coding::{Dictionary, encode, kkt_violation};
+use std::collections::BTreeMap;
 
 #[derive(Deserialize)]
 struct Golden {
@@ -17,6 +18,8 @@ struct Case {
     lam: f64,
     nnz: Vec<usize>,
     objective: Vec<f64>,
+    /// Atom and value of each non-zero, by signal.
+    codes: Vec<BTreeMap<u32, f64>>,
 }
 
 fn columns(values: &[Vec<f64>]) -> Mat<f64> {
@@ -24,7 +27,7 @@ fn columns(values: &[Vec<f64>]) -> Mat<f64> {
 }
 
 #[test]
-fn objectives_and_supports_agree_with_the_reference() {
+fn objectives_and_codes_agree_with_the_reference() {
     let golden: Golden = serde_json::from_str(include_str!("../data/golden/lasso.json")).unwrap();
     let dictionary = Dictionary::new(columns(&golden.dictionary_atoms)).unwrap();
     let signals = columns(&golden.signals);
@@ -41,6 +44,18 @@ fn objectives_and_supports_agree_with_the_reference() {
         }
         let nonzeros: Vec<usize> = codes.offsets.windows(2).map(|w| w[1] - w[0]).collect();
         assert_eq!(nonzeros, case.nnz, "λ {}", case.lam);
+        for (i, expected) in case.codes.iter().enumerate() {
+            let range = codes.offsets[i]..codes.offsets[i + 1];
+            let found = codes.atoms[range.clone()].iter().zip(&codes.values[range]);
+            for ((atom, value), (expected_atom, expected)) in found.zip(expected) {
+                assert_eq!(atom, expected_atom, "λ {}, signal {i}", case.lam);
+                assert!(
+                    (value - expected).abs() <= 1e-8,
+                    "λ {}, signal {i}: {value} {expected}",
+                    case.lam
+                );
+            }
+        }
         let violations = kkt_violation(&dictionary, signals.as_ref(), case.lam, &codes).unwrap();
         for (i, violation) in violations.iter().enumerate() {
             assert!(

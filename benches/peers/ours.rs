@@ -1,0 +1,298 @@
+//! The shapelex side of the comparison with the Python peers: reads one JSON command per line, does the work, answers
+//! with one JSON line that names the milliseconds it took. Arrays go through files of little-endian f64, column by
+//! column, so that both sides work on the same numbers. Run by `benches/peers/run`; without input it does nothing.
+
+use faer::Mat;
+use serde_json::{Value, json};
+use shapelex::cancel::Cancel;
+use shapelex::coding::{Dictionary, LearnParameters, encode, learn};
+use shapelex::mesh::{Limits, PrepareOptions, Source, TriangleSoup, prepare, read};
+use shapelex::parameters::{Channel, Parameters, Preset};
+use shapelex::pipeline::{Description, describe_query, describe_shape, learn_model, rank};
+use shapelex::ranking::{Index, IndexedClass};
+use shapelex::spectral::{EigenOptions, Operators, assemble, smallest_eigenpairs};
+use std::error::Error;
+use std::io::{BufRead, Write};
+use std::path::Path;
+use std::time::Instant;
+
+type Outcome = Result<Value, Box<dyn Error>>;
+
+#[derive(Default)]
+struct State {
+    operators: Option<Operators>,
+    signals: Option<Mat<f64>>,
+    dictionary: Option<Dictionary>,
+    index: Option<Index>,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    // Cargo passes --bench; anything else on the command line is not for us either.
+    let mut state = State::default();
+    let mut answer = std::io::stdout();
+    for line in std::io::stdin().lock().lines() {
+        let command: Value = serde_json::from_str(&line?)?;
+        let reply = state
+            .run(&command)
+            .unwrap_or_else(|e| json!({ "error": e.to_string() }));
+        writeln!(answer, "{reply}")?;
+        answer.flush()?;
+    }
+    Ok(())
+}
+
+impl State {
+    fn run(&mut self, command: &Value) -> Outcome {
+        match text(command, "op")? {
+            "operators" => self.operators(command),
+            "eigen" => self.eigen(command),
+            "describe" => self.describe(command),
+            "learn" => self.learn(command),
+            "dictionary" => self.dictionary(command),
+            "lasso" => self.lasso(command),
+            "index" => self.index(command),
+            "query" => self.query(command),
+            "read" => read_clean(command),
+            other => Err(format!("unknown op {other}").into()),
+        }
+    }
+
+    /// Reads a mesh as it is and writes W (CSC) and A.
+    fn operators(&mut self, command: &Value) -> Outcome {
+        let options = PrepareOptions {
+            fill_holes_below: 0.0,
+            working_size: 0,
+            ..Default::default()
+        };
+        let (mesh, _) = prepare(soup(text(command, "mesh")?)?, &options)?;
+        let operators = assemble(&mesh)?;
+        let out = Path::new(text(command, "out")?);
+        let w = &operators.stiffness;
+        let pointers: Vec<f64> = w.indptr().raw_storage().iter().map(|&p| p as f64).collect();
+        let indices: Vec<f64> = w.indices().iter().map(|&i| i as f64).collect();
+        write(&out.join("indptr"), &pointers)?;
+        write(&out.join("indices"), &indices)?;
+        write(&out.join("data"), w.data())?;
+        write(&out.join("mass"), &operators.mass)?;
+        let vertices = operators.mass.len();
+        self.operators = Some(operators);
+        Ok(json!({ "vertices": vertices }))
+    }
+
+    fn eigen(&mut self, command: &Value) -> Outcome {
+        let operators = self.operators.as_ref().ok_or("no operators")?;
+        let n = number(command, "n")? as usize;
+        let started = Instant::now();
+        let pairs = smallest_eigenpairs(operators, n, &EigenOptions::default(), &Cancel::new())?;
+        let ms = milliseconds(started);
+        write(Path::new(text(command, "values")?), &pairs.values)?;
+        Ok(json!({ "ms": ms, "residual": pairs.residual }))
+    }
+
+    /// The signals of a training shape under a preset.
+    fn describe(&mut self, command: &Value) -> Outcome {
+        let parameters = parameters(command)?;
+        let described = describe_shape(
+            soup(text(command, "mesh")?)?,
+            &parameters,
+            &Cancel::new(),
+            &|_| (),
+        )?;
+        let matrix = described.views[0].signatures.matrix.clone();
+        write_matrix(Path::new(text(command, "signals")?), &matrix)?;
+        let shape = [matrix.nrows(), matrix.ncols()];
+        self.signals = Some(matrix);
+        Ok(json!({ "shape": shape }))
+    }
+
+    /// Loads signals (M × N) and learns a dictionary.
+    fn learn(&mut self, command: &Value) -> Outcome {
+        let signals = read_matrix(
+            Path::new(text(command, "signals")?),
+            number(command, "rows")? as usize,
+        )?;
+        let learning = LearnParameters {
+            atoms: number(command, "atoms")? as usize,
+            lambda: number(command, "lambda")?,
+            iterations: number(command, "iterations")? as usize,
+            batch: number(command, "batch")? as usize,
+            seed: 1,
+        };
+        let started = Instant::now();
+        let (dictionary, report) = learn(signals.as_ref(), &learning, &Cancel::new(), &|_, _| ())?;
+        let ms = milliseconds(started);
+        write_matrix(Path::new(text(command, "dictionary")?), dictionary.atoms())?;
+        self.dictionary = Some(dictionary);
+        Ok(json!({ "ms": ms, "atoms": report.atoms }))
+    }
+
+    fn dictionary(&mut self, command: &Value) -> Outcome {
+        let rows = number(command, "rows")? as usize;
+        self.dictionary = Some(Dictionary::new(read_matrix(
+            Path::new(text(command, "dictionary")?),
+            rows,
+        )?)?);
+        self.signals = Some(read_matrix(Path::new(text(command, "signals")?), rows)?);
+        Ok(json!({}))
+    }
+
+    fn lasso(&mut self, command: &Value) -> Outcome {
+        let dictionary = self.dictionary.as_ref().ok_or("no dictionary")?;
+        let signals = self.signals.as_ref().ok_or("no signals")?;
+        let started = Instant::now();
+        let codes = encode(
+            dictionary,
+            signals.as_ref(),
+            number(command, "lambda")?,
+            &Cancel::new(),
+        )?;
+        let ms = milliseconds(started);
+        let objective: f64 = codes.objective.iter().sum();
+        let nonzeros = codes.values.len() as f64 / codes.objective.len() as f64;
+        Ok(json!({ "ms": ms, "objective": objective, "nonzeros": nonzeros }))
+    }
+
+    /// Learns one class per folder of training meshes: the whole reindex without service and store.
+    fn index(&mut self, command: &Value) -> Outcome {
+        let parameters = parameters(command)?;
+        let classes = command["classes"].as_array().ok_or("classes")?;
+        let started = Instant::now();
+        let indexed = rayon::iter::IntoParallelRefIterator::par_iter(classes);
+        let classes: Result<Vec<IndexedClass>, String> =
+            rayon::iter::ParallelIterator::collect(rayon::iter::ParallelIterator::map(indexed, |class| {
+                index_class(class, &parameters).map_err(|e| e.to_string())
+            }));
+        let index = Index {
+            classes: classes?,
+            parameters,
+        };
+        let ms = milliseconds(started);
+        let out = Path::new(text(command, "out")?);
+        for class in &index.classes {
+            write_matrix(
+                &out.join(&class.label),
+                class.dictionaries[&Channel::Plain].atoms(),
+            )?;
+        }
+        self.index = Some(index);
+        Ok(json!({ "ms": ms }))
+    }
+
+    /// Mesh bytes to ranking.
+    fn query(&mut self, command: &Value) -> Outcome {
+        let index = self.index.as_ref().ok_or("no index")?;
+        let bytes = std::fs::read(text(command, "mesh")?)?;
+        let started = Instant::now();
+        let source = Source {
+            bytes: &bytes,
+            ..Default::default()
+        };
+        let (_, soup) = read(&source, &Limits::default())?;
+        let query = describe_query(soup, &index.parameters, &Cancel::new(), &|_| ())?;
+        let ranking = rank(&query.views, index, index.parameters.rank_by, &Cancel::new())?;
+        let ms = milliseconds(started);
+        Ok(json!({ "ms": ms, "best": ranking.classes[0].label, "score": ranking.classes[0].score }))
+    }
+}
+
+fn index_class(class: &Value, parameters: &Parameters) -> Result<IndexedClass, Box<dyn Error>> {
+    let described = class["meshes"]
+        .as_array()
+        .ok_or("meshes")?
+        .iter()
+        .map(|mesh| {
+            let soup = soup(mesh.as_str().ok_or("mesh")?)?;
+            Ok(describe_shape(soup, parameters, &Cancel::new(), &|_| ())?)
+        })
+        .collect::<Result<Vec<Description>, Box<dyn Error>>>()?;
+    let shapes: Vec<&Description> = described.iter().collect();
+    let model = learn_model(&shapes, parameters, &Cancel::new(), &|_, _| ())?;
+    Ok(IndexedClass {
+        label: text(class, "label")?.to_owned(),
+        dictionaries: model.dictionaries,
+        shapes: Vec::new(),
+    })
+}
+
+/// Bytes to a clean mesh, without simplification.
+fn read_clean(command: &Value) -> Outcome {
+    let bytes = std::fs::read(text(command, "mesh")?)?;
+    let started = Instant::now();
+    let source = Source {
+        bytes: &bytes,
+        name: Some(text(command, "mesh")?),
+        ..Default::default()
+    };
+    let (_, soup) = read(&source, &Limits::default())?;
+    let read_ms = milliseconds(started);
+    let options = PrepareOptions {
+        fill_holes_below: 0.0,
+        working_size: 0,
+        ..Default::default()
+    };
+    let (mesh, _) = prepare(soup, &options)?;
+    Ok(json!({ "ms": read_ms, "clean_ms": milliseconds(started), "faces": mesh.faces().len() }))
+}
+
+fn parameters(command: &Value) -> Result<Parameters, Box<dyn Error>> {
+    let preset: Preset = serde_json::from_value(command["preset"].clone())?;
+    let mut parameters = Parameters::preset(preset);
+    if let Some(normalisation) = command.get("normalisation") {
+        parameters.normalisation = serde_json::from_value(normalisation.clone())?;
+    }
+    // Both sides describe the mesh they are given.
+    parameters.working_size = 0;
+    parameters.fill_holes_below = 0.0;
+    Ok(parameters)
+}
+
+fn soup(path: &str) -> Result<TriangleSoup, Box<dyn Error>> {
+    let bytes = std::fs::read(path)?;
+    let source = Source {
+        bytes: &bytes,
+        name: Some(path),
+        ..Default::default()
+    };
+    Ok(read(&source, &Limits::default())?.1)
+}
+
+fn text<'a>(command: &'a Value, key: &str) -> Result<&'a str, Box<dyn Error>> {
+    command[key]
+        .as_str()
+        .ok_or_else(|| format!("{key} is missing").into())
+}
+
+fn number(command: &Value, key: &str) -> Result<f64, Box<dyn Error>> {
+    command[key]
+        .as_f64()
+        .ok_or_else(|| format!("{key} is missing").into())
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}
+
+fn write(path: &Path, values: &[f64]) -> std::io::Result<()> {
+    std::fs::write(
+        path,
+        values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>(),
+    )
+}
+
+fn write_matrix(path: &Path, matrix: &Mat<f64>) -> std::io::Result<()> {
+    let columns = (0..matrix.ncols()).flat_map(|j| matrix.col(j).iter().copied().collect::<Vec<f64>>());
+    write(path, &columns.collect::<Vec<f64>>())
+}
+
+fn read_matrix(path: &Path, rows: usize) -> Result<Mat<f64>, Box<dyn Error>> {
+    let bytes = std::fs::read(path)?;
+    let values: Vec<f64> = bytes
+        .as_chunks::<8>()
+        .0
+        .iter()
+        .map(|c| f64::from_le_bytes(*c))
+        .collect();
+    Ok(Mat::from_fn(rows, values.len() / rows, |i, j| {
+        values[j * rows + i]
+    }))
+}

@@ -1,0 +1,203 @@
+"""The peers' side: scipy (SuperLU) or CHOLMOD with ARPACK for eigenpairs, numpy for WKS, SPAMS for Lasso and learning,
+trimesh for reading. Reads one JSON command per line and answers with one JSON line."""
+
+import json
+import multiprocessing
+import sys
+import time
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
+import spams
+
+try:
+    from sksparse.cholmod import cholesky
+except ImportError:
+    cholesky = None
+
+PRESETS = {
+    "default": dict(energies=100, atoms=128, sample=900, root=True, frobenius=False),
+    "paper": dict(energies=500, atoms=500, sample=0, root=False, frobenius=True),
+}
+THREADS = int(sys.argv[1]) if len(sys.argv) > 1 else 1
+state = {}
+
+
+def load(path, rows=None):
+    values = np.fromfile(path, dtype="<f8")
+    return np.asfortranarray(values.reshape(-1, rows).T) if rows else values
+
+
+def solve(stiffness, mass, n, solver):
+    """The n smallest eigenpairs by shift and invert."""
+    shift = -1.0
+    matrix = sp.diags(mass)
+    if solver == "cholmod":
+        factor = cholesky((stiffness - shift * matrix).tocsc())
+        inverse = sla.LinearOperator(stiffness.shape, matvec=lambda b: factor(b), dtype=float)
+        return sla.eigsh(stiffness, k=n, M=matrix, sigma=shift, OPinv=inverse, tol=1e-6)
+    return sla.eigsh(stiffness, k=n, M=matrix.tocsc(), sigma=shift, tol=1e-6)
+
+
+def best_solver():
+    return "cholmod" if cholesky else "superlu"
+
+
+def parse(path):
+    vertices, faces = [], []
+    for line in open(path):
+        if line.startswith("v "):
+            vertices.append(line.split()[1:4])
+        elif line.startswith("f "):
+            faces.append([p.split("/")[0] for p in line.split()[1:4]])
+    return np.array(vertices, dtype=float), np.array(faces, dtype=int) - 1
+
+
+def laplacian(v, f):
+    n = len(v)
+    i, j, k = f.T
+    w, entries = [], []
+    for a, b, c in ((i, j, k), (j, k, i), (k, i, j)):
+        p, q = v[a] - v[c], v[b] - v[c]
+        cot = (p * q).sum(1) / np.linalg.norm(np.cross(p, q), axis=1)
+        w.append(-0.5 * cot)
+        entries.append((a, b))
+    rows = np.concatenate([e[0] for e in entries])
+    cols = np.concatenate([e[1] for e in entries])
+    m = sp.coo_matrix((np.concatenate(w), (rows, cols)), shape=(n, n)).tocsc()
+    m = m + m.T
+    stiffness = (m - sp.diags(np.asarray(m.sum(1)).ravel())).tocsc()
+    area = np.linalg.norm(np.cross(v[j] - v[i], v[k] - v[i]), axis=1) / 2
+    mass = np.bincount(f.ravel(), np.repeat(area / 3, 3), n)
+    return stiffness, mass / mass.sum()
+
+
+def wks(values, vectors, energies):
+    logs, squared = np.log(values[1:]), vectors[:, 1:] ** 2
+    grid = np.linspace(logs[0], logs[-1] / 1.02, energies)
+    sigma = 6 * (grid[1] - grid[0])
+    exponent = -((grid[:, None] - logs[None]) ** 2) / (2 * sigma**2)
+    weight = np.exp(exponent - exponent.max(1, keepdims=True))
+    return (weight / weight.sum(1, keepdims=True)) @ squared.T
+
+
+def signals_of(path, preset, sample):
+    v, f = parse(path)
+    stiffness, mass = laplacian(v, f)
+    values, vectors = solve(stiffness, mass, 200, best_solver())
+    s = np.maximum(wks(values, vectors, preset["energies"]), 0)
+    if sample and sample < s.shape[1]:
+        s = s[:, np.random.default_rng(1).choice(s.shape[1], sample, replace=False, p=mass)]
+    s = np.sqrt(s) if preset["root"] else s
+    return np.asfortranarray(s / np.linalg.norm(s, axis=0))
+
+
+def objective(signals, dictionary, parameter):
+    codes = spams.lasso(signals, D=dictionary, lambda1=parameter, mode=2, numThreads=THREADS)
+    residual = signals - dictionary @ codes
+    return 0.5 * (residual**2).sum() + parameter * abs(codes).sum(), np.linalg.norm(residual)
+
+
+def train(signals, atoms, parameter, iterations, batch):
+    return spams.trainDL(
+        signals, K=atoms, lambda1=parameter, mode=2, iter=iterations, batchsize=batch, numThreads=1, verbose=False
+    )
+
+
+def index_class(job):
+    preset, meshes = job
+    signals = np.asfortranarray(np.hstack([signals_of(m, preset, preset["sample"]) for m in meshes]))
+    return train(signals, preset["atoms"], 0.5, 25, 256)
+
+
+def run(c):
+    op = c["op"]
+    if op == "operators":
+        d = c["dir"] + "/"
+        pointers, indices = load(d + "indptr").astype(int), load(d + "indices").astype(int)
+        n = len(pointers) - 1
+        state["w"] = sp.csc_matrix((load(d + "data"), indices, pointers), shape=(n, n))
+        state["a"] = load(d + "mass")
+        return {}
+    if op == "eigen":
+        best = None
+        # Whichever of the two is the faster is the peer.
+        for solver in ("superlu", "cholmod") if cholesky else ("superlu",):
+            started = time.perf_counter()
+            values, _ = solve(state["w"], state["a"], c["n"], solver)
+            ms = (time.perf_counter() - started) * 1e3
+            if best is None or ms < best[0]:
+                best = (ms, solver)
+            np.sort(values).tofile(c["values"])
+        return dict(ms=best[0], solver=best[1])
+    if op == "close":
+        a, b = load(c["a"]), load(c["b"])
+        floor = 1e-6 * b[-1]
+        return dict(relative=float(np.max(np.abs(a - b) / np.maximum(np.abs(b), floor))))
+    if op == "learn":
+        signals = load(c["signals"], c["rows"])
+        started = time.perf_counter()
+        d = train(signals, c["atoms"], c["parameter"], c["iterations"], c["batch"])
+        ms = (time.perf_counter() - started) * 1e3
+        np.asfortranarray(d).T.tofile(c["dictionary"])
+        return dict(ms=ms)
+    if op == "objective":
+        total, _ = objective(load(c["signals"], c["rows"]), load(c["dictionary"], c["rows"]), c["parameter"])
+        return dict(objective=total)
+    if op == "dictionary":
+        state["d"], state["s"] = load(c["dictionary"], c["rows"]), load(c["signals"], c["rows"])
+        return {}
+    if op == "lasso":
+        started = time.perf_counter()
+        codes = spams.lasso(state["s"], D=state["d"], lambda1=c["parameter"], mode=2, numThreads=THREADS)
+        ms = (time.perf_counter() - started) * 1e3
+        residual = state["s"] - state["d"] @ codes
+        return dict(ms=ms, objective=float(0.5 * (residual**2).sum() + c["parameter"] * abs(codes).sum()))
+    if op == "index":
+        jobs = [(PRESETS[c["preset"]], k["meshes"]) for k in c["classes"]]
+        started = time.perf_counter()
+        with multiprocessing.Pool(2) as pool:
+            pool.map(index_class, jobs, chunksize=1)
+        return dict(ms=(time.perf_counter() - started) * 1e3)
+    if op == "load":
+        import pathlib
+
+        preset = PRESETS[c["preset"]]
+        state["preset"] = preset
+        files = sorted(pathlib.Path(c["dir"]).iterdir())
+        state["index"] = {p.name: load(p, preset["energies"]) for p in files}
+        return {}
+    if op == "query":
+        preset = state["preset"]
+        started = time.perf_counter()
+        signals = signals_of(c["mesh"], preset, 0)
+        scores = {}
+        for name, d in state["index"].items():
+            total, frobenius = objective(signals, d, 0.5)
+            scores[name] = frobenius if preset["frobenius"] else total / signals.shape[1]
+        best = min(scores, key=scores.get)
+        return dict(ms=(time.perf_counter() - started) * 1e3, best=best, score=float(scores[best]))
+    if op == "convert":
+        import trimesh
+
+        mesh = trimesh.load(c["mesh"], process=False)
+        for kind in ("ply", "glb"):
+            mesh.export(f"{c['out']}/big.{kind}")
+        return {}
+    if op == "read":
+        import trimesh
+
+        started = time.perf_counter()
+        mesh = trimesh.load(c["mesh"], process=False, force="mesh")
+        return dict(ms=(time.perf_counter() - started) * 1e3, faces=len(mesh.faces))
+    raise ValueError(op)
+
+
+if __name__ == "__main__":
+    for line in sys.stdin:
+        try:
+            answer = run(json.loads(line))
+        except Exception as error:  # The other side shows it and stops.
+            answer = dict(error=f"{type(error).__name__}: {error}")
+        print(json.dumps(answer), flush=True)

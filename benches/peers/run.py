@@ -1,0 +1,254 @@
+"""shapelex and its Python peers on the same inputs, in turn, in one run.
+
+Every row is measured in rounds: ours, theirs, ours, theirs, ... so that a change in the machine's speed meets both.
+The ratio is the median of the rounds' ratios, with its quartiles; `agree` says whether the answers are the same.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+
+
+class Process:
+    """A worker that answers one JSON line per JSON line."""
+
+    def __init__(self, command, threads):
+        environment = dict(os.environ, RAYON_NUM_THREADS=str(threads))
+        for name in ("OPENBLAS", "OMP", "MKL"):
+            environment[name + "_NUM_THREADS"] = str(threads)
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+        )
+
+    def __call__(self, **command):
+        self.process.stdin.write(json.dumps(command) + "\n")
+        self.process.stdin.flush()
+        line = self.process.stdout.readline()
+        if not line:
+            raise SystemExit(f"a worker ended during {command}")
+        answer = json.loads(line)
+        if "error" in answer:
+            raise SystemExit(f"{command}: {answer['error']}")
+        return answer
+
+
+class Table:
+    def __init__(self):
+        self.rows = {}
+
+    def measure(self, name, rounds, ours, theirs, agree):
+        pairs = []
+        for _ in range(rounds):
+            a, b = ours(), theirs()
+            pairs.append((a, b))
+        ratios = [b["ms"] / a["ms"] for a, b in pairs]
+        quartiles = statistics.quantiles(ratios, n=4) if len(ratios) > 1 else [ratios[0]] * 3
+        self.rows[name] = {
+            "ours_ms": round(statistics.median(a["ms"] for a, _ in pairs), 3),
+            "peer_ms": round(statistics.median(b["ms"] for _, b in pairs), 3),
+            "ratio": round(statistics.median(ratios), 2),
+            "quartiles": [round(quartiles[0], 2), round(quartiles[2], 2)],
+            "agree": bool(agree(*pairs[-1])),
+        }
+        row = self.rows[name]
+        print(
+            f"{name:58} {row['ours_ms']:10.2f} {row['peer_ms']:10.2f} {row['ratio']:8.2f} "
+            f"({row['quartiles'][0]:.2f}-{row['quartiles'][1]:.2f})  {'yes' if row['agree'] else 'NO'}",
+            flush=True,
+        )
+
+
+def creatures(shapelex, directory, classes, poses):
+    """A folder per class of procedural creatures, as lists of paths by class."""
+    subprocess.run(
+        [shapelex, "zoo", "--out", directory, "--classes", str(classes), "--poses", str(poses)],
+        check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )
+    return {d.name: sorted(map(str, d.glob("*.obj"))) for d in sorted(Path(directory).iterdir()) if d.is_dir()}
+
+
+def subdivide(source, target, times):
+    """Every face into four, `times` times, with a little of each new vertex's neighbourhood smoothed in."""
+    vertices, faces = [], []
+    for line in open(source):
+        part = line.split()
+        if part[:1] == ["v"]:
+            vertices.append([float(x) for x in part[1:4]])
+        elif part[:1] == ["f"]:
+            faces.append([int(x.split("/")[0]) - 1 for x in part[1:4]])
+    for _ in range(times):
+        middle, finer = {}, []
+
+        def between(a, b):
+            key = (min(a, b), max(a, b))
+            if key not in middle:
+                middle[key] = len(vertices)
+                vertices.append([(p + q) / 2 for p, q in zip(vertices[a], vertices[b])])
+            return middle[key]
+
+        for a, b, c in faces:
+            ab, bc, ca = between(a, b), between(b, c), between(c, a)
+            finer += [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
+        faces = finer
+    with open(target, "w") as out:
+        out.write("".join(f"v {x:.7f} {y:.7f} {z:.7f}\n" for x, y, z in vertices))
+        out.write("".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces))
+    return len(vertices)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--ours", required=True)
+    parser.add_argument("--shapelex", required=True)
+    parser.add_argument("--quick", action="store_true", help="smaller inputs and fewer rounds, under 5 minutes")
+    parser.add_argument("--json", action="store_true", help="the last line is one object of all rows")
+    parser.add_argument("--threads", default="1,2")
+    parser.add_argument("--rows", default="eigen,lasso,learn,query,read")
+    options = parser.parse_args()
+    wanted = options.rows.split(",")
+    table = Table()
+    print(f"{'':58} {'ours ms':>10} {'peer ms':>10} {'ratio':>8} (quartiles)  agree")
+    with tempfile.TemporaryDirectory() as scratch:
+        scratch = Path(scratch)
+        zoo = creatures(options.shapelex, scratch / "zoo", 12, 5 if options.quick else 13)
+        for threads in map(int, options.threads.split(",")):
+            ours = Process([options.ours], threads)
+            peer = Process([sys.executable, str(HERE / "peer.py"), str(threads)], threads)
+            label = f"{threads} thread{'s' if threads > 1 else ''}"
+            if "eigen" in wanted:
+                eigen(table, ours, peer, zoo, scratch, label, options.quick)
+            if "lasso" in wanted or "learn" in wanted:
+                coding(table, ours, peer, zoo, scratch, label, options.quick, wanted, threads)
+            if "query" in wanted:
+                whole(table, ours, peer, zoo, scratch, label, options.quick, threads)
+            if "read" in wanted and threads == 1:
+                reading(table, ours, peer, zoo, scratch, options.quick)
+    if options.json:
+        print(json.dumps(table.rows))
+
+
+def eigen(table, ours, peer, zoo, scratch, label, quick):
+    first = next(iter(zoo.values()))[0]
+    inputs = [("zoo", first)]
+    for times in (1, 2) if quick else (1, 2, 3):
+        finer = scratch / f"finer{times}.obj"
+        if not finer.exists():
+            subdivide(first, finer, times)
+        inputs.append(("zoo, subdivided", str(finer)))
+    for path in ("tosca_lowres/cat/cat0.off", "sumner/cat/cat-reference.obj"):
+        real = ROOT.parent / "shared" / "data" / path
+        if real.exists():
+            inputs.append((path, str(real)))
+        else:
+            print(f"skipped: {path}: not there")
+    for name, mesh in inputs:
+        size = ours(op="operators", mesh=mesh, out=str(scratch))["vertices"]
+        peer(op="operators", dir=str(scratch))
+        rounds = 1 if size > 50_000 else 3 if size > 10_000 or quick else 5
+        table.measure(
+            f"200 eigenpairs, {size} vertices ({name}), {label}", rounds,
+            lambda: ours(op="eigen", n=200, values=str(scratch / "ours")),
+            lambda: peer(op="eigen", n=200, values=str(scratch / "theirs")),
+            lambda a, b: peer(op="close", a=str(scratch / "ours"), b=str(scratch / "theirs"))["relative"] < 1e-6,
+        )
+
+
+def coding(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
+    if threads > 1:
+        return  # Both sides code one class on one thread; classes are what runs in parallel.
+    class_meshes = next(iter(zoo.values()))
+    settings = [("default", "sqrt_unit", 128), ("paper", "unit", 500), ("paper", "raw", 500)]
+    for preset, normalisation, atoms in settings:
+        parts = []
+        for i, mesh in enumerate(class_meshes[:5]):
+            path = scratch / f"signals{i}"
+            rows, _ = ours(op="describe", mesh=mesh, preset=preset, normalisation=normalisation, signals=str(path))["shape"]
+            parts.append(path)
+        held_out = scratch / "held_out"
+        held_out.write_bytes(parts[-1].read_bytes()[: 1500 * rows * 8])
+        training = scratch / "training"
+        training.write_bytes(b"".join(p.read_bytes() for p in parts[:-1]))
+        setup = dict(signals=str(training), rows=rows, atoms=atoms, batch=256)
+        name = f"{preset} preset, {normalisation}"
+        if normalisation != "raw" and "learn" in wanted:
+            judge = lambda d: peer(op="objective", signals=str(held_out), dictionary=d, rows=rows, parameter=0.5)["objective"]
+            table.measure(
+                f"learning, {name}, {label}", 2 if quick else 4,
+                lambda: ours(op="learn", **setup, **{"lambda": 0.5}, iterations=25, dictionary=str(scratch / "d_ours")),
+                lambda: peer(op="learn", **setup, parameter=0.5, iterations=25, dictionary=str(scratch / "d_theirs")),
+                lambda a, b: judge(str(scratch / "d_ours")) <= judge(str(scratch / "d_theirs")) * (1 + 1e-4),
+            )
+        peer(op="learn", **setup, parameter=0.5, iterations=25, dictionary=str(scratch / "d"))
+        files = dict(signals=str(held_out), dictionary=str(scratch / "d"), rows=rows)
+        ours(op="dictionary", **files)
+        peer(op="dictionary", **files)
+        for parameter in (0.5, 0.05) if "lasso" in wanted else ():
+            table.measure(
+                f"Lasso of 1500 signals, {name}, lambda {parameter}, {label}", 3 if quick else 7,
+                lambda: ours(op="lasso", **{"lambda": parameter}),
+                lambda: peer(op="lasso", parameter=parameter),
+                lambda a, b: abs(a["objective"] - b["objective"]) <= 1e-6 * b["objective"],
+            )
+
+
+def whole(table, ours, peer, zoo, scratch, label, quick, threads):
+    held_out = {name: meshes[-1] for name, meshes in zoo.items()}
+    classes = [dict(label=name, meshes=meshes[:-1]) for name, meshes in zoo.items()]
+    for preset in ("default", "paper"):
+        directory = scratch / f"index-{preset}"
+        directory.mkdir(exist_ok=True)
+        poses = len(classes[0]["meshes"])
+        if preset == "default" and threads == 2:
+            table.measure(
+                f"whole reindex, 12 classes x {poses} shapes, {preset} preset, 2 threads / processes", 1,
+                lambda: ours(op="index", preset=preset, classes=classes, out=str(directory)),
+                lambda: peer(op="index", preset=preset, classes=classes),
+                lambda a, b: True,
+            )
+        else:
+            ours(op="index", preset=preset, classes=classes, out=str(directory))
+        peer(op="load", preset=preset, dir=str(directory))
+        meshes = list(held_out.items())
+        turn = {"ours": 0, "theirs": 0}
+
+        def next_mesh(side):
+            name, mesh = meshes[turn[side] % len(meshes)]
+            turn[side] += 1
+            return mesh
+
+        table.measure(
+            f"whole query, 12 classes, {preset} preset, {label}", 4 if quick else 12,
+            lambda: ours(op="query", mesh=next_mesh("ours")),
+            lambda: peer(op="query", mesh=next_mesh("theirs")),
+            lambda a, b: a["best"] == b["best"] and abs(a["score"] - b["score"]) < 1e-4 * b["score"],
+        )
+
+
+def reading(table, ours, peer, zoo, scratch, quick):
+    big = scratch / "big.obj"
+    subdivide(next(iter(zoo.values()))[0], big, 3 if quick else 4)
+    peer(op="convert", mesh=str(big), out=str(scratch))
+    for kind in ("obj", "ply", "glb"):
+        mesh = str(scratch / f"big.{kind}")
+        faces = ours(op="read", mesh=mesh)["faces"]
+        table.measure(
+            f"read {kind.upper()} of {faces} faces, against trimesh", 2 if quick else 4,
+            lambda: ours(op="read", mesh=mesh),
+            lambda: peer(op="read", mesh=mesh),
+            lambda a, b: a["faces"] == b["faces"],
+        )
+
+
+if __name__ == "__main__":
+    started = time.time()
+    main()
+    print(f"{time.time() - started:.0f} s in all", file=sys.stderr)
