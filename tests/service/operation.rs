@@ -1,8 +1,15 @@
 //! What those who run the service see.
 
 use crate::harness::App;
+use crate::meshes::dense;
+use axum::Router;
 use axum::body::Body;
 use axum::http::Request;
+use axum::middleware::from_fn_with_state;
+use axum::routing::get;
+use shapelex::http::respond;
+use std::time::Duration;
+use tower_http::catch_panic::CatchPanicLayer;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn probes_answer_and_readiness_names_what_is_wrong() {
@@ -69,4 +76,51 @@ async fn the_pages_need_nothing_from_elsewhere() {
             assert!(!text.contains(outside), "{path} refers to {outside}");
         }
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_panic_is_a_problem_and_is_counted() {
+    let mut app = App::new();
+    let boom = || async {
+        if true {
+            panic!("on purpose");
+        }
+    };
+    app.router = Router::new()
+        .route("/boom", get(boom))
+        .layer(CatchPanicLayer::custom(respond::panicked))
+        .layer(from_fn_with_state(app.state.clone(), respond::around));
+    let body = app.get("/boom").await.fails(500, "internal");
+    assert!(
+        !body.to_string().contains("on purpose"),
+        "what went wrong is for the log: {body}"
+    );
+    let text = shapelex::http::metrics::render(&app.state);
+    let count = text
+        .lines()
+        .find_map(|l| l.strip_prefix("shapelex_panics_total "));
+    assert_ne!(count, Some("0"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_full_house_turns_away_and_says_when_to_come_back() {
+    let app = App::with(|c| {
+        c.query_threads = 1;
+        c.query_queue = 1;
+        c.query_wait = Duration::from_secs(30);
+    });
+    let dense = dense().off();
+    let path = |i: u32| format!("/v1/classes/c{i}/shapes?create=true");
+    let (a, b, c) = (path(1), path(2), path(3));
+    let (a, b, c) = tokio::join!(
+        app.post(&a, "model/off", dense.clone()),
+        app.post(&b, "model/off", dense.clone()),
+        app.post(&c, "model/off", dense.clone()),
+    );
+    let mut statuses = [&a, &b, &c].map(|r| r.status.as_u16());
+    statuses.sort_unstable();
+    assert_eq!(statuses, [201, 201, 503]);
+    let refused = [&a, &b, &c].into_iter().find(|r| r.status == 503).unwrap();
+    assert_eq!(refused.fails(503, "overloaded")["retry_after_seconds"], 30);
+    assert_eq!(refused.header("retry-after"), "30");
 }
