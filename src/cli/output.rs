@@ -45,6 +45,8 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
         TableComponent::BottomBorder,
         TableComponent::HorizontalLines,
         TableComponent::MiddleIntersections,
+        TableComponent::TopBorderIntersections,
+        TableComponent::BottomBorderIntersections,
     ] {
         table.remove_style(line);
     }
