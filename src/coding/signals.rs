@@ -17,8 +17,8 @@ const FAR: f32 = 1e18;
 
 /// N signals in an order in which neighbours are alike, with what the Lasso needs of them under any dictionary.
 ///
-/// Coding walks from each signal to one like it, whose code is nearly its own; the order halves the atoms that change
-/// from one to the next against the order of a mesh file. It is a greedy chain: from each signal to the nearest of a
+/// Coding walks from each signal to one like it, whose code is nearly its own; the order nearly halves the atoms that
+/// change from one to the next against grouping by the atom that correlates most. It is a greedy chain: from each signal to the nearest of a
 /// window of waiting ones, by the sums over 16 stretches of the values.
 #[derive(Clone, Debug)]
 pub struct Signals<'a> {
