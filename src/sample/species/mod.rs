@@ -7,10 +7,13 @@ mod upright;
 use super::generate::Species;
 use super::skeleton::Skeleton;
 
+/// Builds a creature at rest.
+type Plan = fn() -> Skeleton;
+
 impl Species {
     /// The sixteen named species, always in this order.
     pub fn named() -> Vec<Self> {
-        let zoo: [(&str, fn() -> Skeleton); 16] = [
+        let zoo: [(&str, Plan); 16] = [
             ("man", upright::man),
             ("woman", upright::woman),
             ("dog", quadruped::dog),
