@@ -55,16 +55,7 @@ fn an_unknown_parameter_is_answered_with_those_there_are() {
 
 #[test]
 fn inspect_reads_cleans_and_goes_on_after_a_bad_file() {
-    let golden = repository("tests/data/bumpy_closed.off");
-    let golden = if golden.exists() {
-        golden
-    } else {
-        repository("../shared/golden/bumpy_closed.off")
-    };
-    if !golden.exists() {
-        eprintln!("skipped: inspect_reads_cleans_and_goes_on_after_a_bad_file: no bumpy_closed.off");
-        return;
-    }
+    let golden = repository("tests/data/golden/bumpy_closed.off");
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("bad.obj"), "v 0 0 0\nf 1 2 3\n").unwrap();
     std::fs::write(dir.path().join("tetrahedron.obj"), TETRAHEDRON).unwrap();
