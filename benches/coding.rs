@@ -80,10 +80,10 @@ fn coding(criterion: &mut Criterion) {
             });
             group.bench_function(format!("score/{name}/{lambda}"), |bencher| {
                 bencher.iter(|| {
-                    black_box(score_with(
+                    black_box(score_signals(
                         &mut workspace,
                         &dictionary,
-                        query.as_ref(),
+                        &Signals::new(query.as_ref()).expect("the signals are finite"),
                         lambda,
                         &cancel,
                     ))

@@ -2,7 +2,7 @@
 
 use super::{Description, PipelineError, Stage};
 use crate::cancel::Cancel;
-use crate::mesh::double::double;
+use crate::mesh::boundary::boundary_vertices;
 use crate::mesh::whiten::whiten;
 use crate::mesh::{PrepareReport, TriMesh, TriangleSoup, prepare};
 use crate::parameters::{Channel, Hypothesis, Parameters};
@@ -11,7 +11,9 @@ use crate::signature::describe_vertices;
 use crate::signature::descriptor::{Descriptor, DescriptorParameters, WksRange};
 use crate::signature::normalise::normalise;
 use crate::signature::sample::sample_by_area;
-use crate::spectral::{EigenOptions, Eigenpairs, Operators, assemble, smallest_eigenpairs};
+use crate::spectral::{
+    EigenOptions, Eigenpairs, Operators, assemble, doubled_eigenpairs, smallest_eigenpairs,
+};
 
 /// A query with a boundary longer than this many √area is open: a single view has 8 to 16, a half sphere 2.507.
 const OPEN_ABOVE: f64 = 2.5;
@@ -178,11 +180,13 @@ impl PreparedShape {
         parameters: &Parameters,
         cancel: &Cancel,
     ) -> Result<Vec<View>, PipelineError> {
-        let operators = assemble(&double(&self.mesh)?)?;
-        let doubled = smallest_eigenpairs(
-            &operators,
+        let boundary = boundary_vertices(&self.mesh);
+        let options = EigenOptions::default();
+        let doubled = doubled_eigenpairs(
+            &self.operators,
+            &boundary,
             parameters.eigenpairs,
-            &EigenOptions::default(),
+            &options,
             cancel,
         )?;
         AREA_SCALES

@@ -9,5 +9,5 @@ pub mod view;
 pub use error::RankingError;
 pub use index::{Index, IndexedClass, IndexedShape};
 pub use rank::{ClassScore, Ranking, ShapeScore, rank};
-pub use score::{Errors, Score, score};
+pub use score::{Errors, PreparedView, Score, prepare_views, score};
 pub use view::View;

@@ -1,6 +1,6 @@
 //! Class scores → ranking.
 
-use super::score::{Score, score};
+use super::score::{Score, prepare_views, score};
 use super::{Index, RankingError, View};
 use crate::cancel::Cancel;
 use crate::parameters::{Hypothesis, RankBy};
@@ -77,11 +77,19 @@ pub fn rank(
         return Err(RankingError::EmptyIndex);
     }
     let lambda = index.parameters.lambda;
+    let prepared = prepare_views(views, rank_by)?;
     let mut classes = index
         .classes
         .par_iter()
         .map(|class| {
-            let s = score(views, &class.dictionaries, lambda, rank_by, &class.label, cancel)?;
+            let s = score(
+                &prepared,
+                &class.dictionaries,
+                lambda,
+                rank_by,
+                &class.label,
+                cancel,
+            )?;
             Ok(class_score(&class.label, &s))
         })
         .collect::<Result<Vec<_>, RankingError>>()?;
@@ -94,7 +102,14 @@ pub fn rank(
         .par_iter()
         .flat_map(|class| class.shapes.par_iter().map(move |shape| (class, shape)))
         .map(|(class, shape)| {
-            let s = score(views, &shape.dictionaries, lambda, rank_by, &shape.label, cancel)?;
+            let s = score(
+                &prepared,
+                &shape.dictionaries,
+                lambda,
+                rank_by,
+                &shape.label,
+                cancel,
+            )?;
             Ok(ShapeScore {
                 class: class.label.clone(),
                 label: shape.label.clone(),

@@ -2,7 +2,7 @@
 
 use super::{RankingError, View};
 use crate::cancel::Cancel;
-use crate::coding::{Codes, Dictionary, encode};
+use crate::coding::{CodeScore, CodingError, Dictionary, Signals, Workspace, score_signals};
 use crate::parameters::{Channel, Hypothesis, RankBy};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -33,14 +33,14 @@ pub struct Errors {
 }
 
 impl Errors {
-    /// Sums up the codes of N signals with ‖S‖²_F = `energy`.
-    pub fn of(codes: &Codes, energy: f64) -> Self {
-        let n = codes.objective.len().max(1) as f64;
-        let residual2: f64 = codes.residual2.iter().sum();
-        let frobenius = residual2.max(0.0).sqrt();
-        let mut sorted = codes.objective.clone();
-        sorted.sort_unstable_by(f64::total_cmp);
-        let kept = ((sorted.len() as f64 * TRIMMED_SHARE).ceil() as usize).clamp(1, sorted.len().max(1));
+    /// Sums up the costs of N codes of signals with ‖S‖²_F = `energy`.
+    pub fn of(codes: &[CodeScore], energy: f64) -> Self {
+        let n = codes.len().max(1) as f64;
+        let frobenius = codes.iter().map(|c| c.residual2).sum::<f64>().max(0.0).sqrt();
+        let mut objectives: Vec<f64> = codes.iter().map(|c| c.objective).collect();
+        let mean_objective = objectives.iter().sum::<f64>() / n;
+        objectives.sort_unstable_by(f64::total_cmp);
+        let kept = ((objectives.len() as f64 * TRIMMED_SHARE).ceil() as usize).clamp(1, codes.len().max(1));
         Self {
             frobenius,
             relative: if energy > 0.0 {
@@ -48,9 +48,9 @@ impl Errors {
             } else {
                 0.0
             },
-            mean_objective: codes.objective.iter().sum::<f64>() / n,
-            trimmed_objective: sorted.iter().take(kept).sum::<f64>() / kept as f64,
-            mean_nonzeros: codes.values.len() as f64 / n,
+            mean_objective,
+            trimmed_objective: objectives.iter().take(kept).sum::<f64>() / kept as f64,
+            mean_nonzeros: codes.iter().map(|c| c.nonzeros).sum::<usize>() as f64 / n,
         }
     }
 
@@ -61,6 +61,32 @@ impl Errors {
             RankBy::Frobenius => self.frobenius,
         }
     }
+}
+
+/// A view made ready for coding, once for all classes.
+pub struct PreparedView<'a> {
+    view: &'a View,
+    signals: Signals<'a>,
+    energy: f64,
+}
+
+/// Makes views ready for coding. A ranking by Eq. 5 knows the plain hypothesis only.
+///
+/// # Errors
+/// [`CodingError::NotFinite`] where a signal is not finite.
+pub fn prepare_views(views: &[View], rank_by: RankBy) -> Result<Vec<PreparedView<'_>>, CodingError> {
+    views
+        .iter()
+        .filter(|view| rank_by != RankBy::Frobenius || view.hypothesis == Hypothesis::Plain)
+        .map(|view| {
+            let signals = Signals::new(view.signatures.matrix.as_ref())?;
+            Ok(PreparedView {
+                view,
+                signals,
+                energy: view.signatures.energy(),
+            })
+        })
+        .collect()
 }
 
 /// A score, where it comes from, and the plain hypothesis's errors.
@@ -80,28 +106,31 @@ pub struct Score {
 /// −τ ln mean exp(−m/τ) over the areas assumed (method, step 10). Offsets are in units of the mean objective, so a
 /// ranking by Eq. 5 knows the plain hypothesis only.
 pub fn score(
-    views: &[View],
+    views: &[PreparedView<'_>],
     dictionaries: &BTreeMap<Channel, Arc<Dictionary>>,
     lambda: f64,
     rank_by: RankBy,
     label: &str,
     cancel: &Cancel,
 ) -> Result<Score, RankingError> {
+    let mut workspace = Workspace::default();
     let mut plain = None;
     let mut whitened = None;
     let mut doubled = Vec::new();
-    for view in views {
-        if rank_by == RankBy::Frobenius && view.hypothesis != Hypothesis::Plain {
-            continue;
-        }
+    for PreparedView {
+        view,
+        signals,
+        energy,
+    } in views
+    {
         let dictionary = dictionaries
             .get(&view.channel)
             .ok_or_else(|| RankingError::MissingChannel {
                 class: label.to_owned(),
                 channel: view.channel,
             })?;
-        let codes = encode(dictionary, view.signatures.matrix.as_ref(), lambda, cancel)?;
-        let errors = Errors::of(&codes, view.signatures.energy());
+        let codes = score_signals(&mut workspace, dictionary, signals, lambda, cancel)?;
+        let errors = Errors::of(&codes, *energy);
         match view.hypothesis {
             Hypothesis::Plain => plain = Some(errors),
             Hypothesis::Whitened => whitened = Some(errors.by(rank_by)),
@@ -160,13 +189,18 @@ mod tests {
 
     #[test]
     fn errors_sum_up_codes() {
-        let codes = Codes {
-            offsets: vec![0, 1, 3, 3, 4, 5],
-            atoms: vec![0, 0, 1, 2, 0],
-            values: vec![1.0; 5],
-            objective: vec![0.5, 0.1, 0.2, 0.3, 9.0],
-            residual2: vec![1.0, 0.5, 0.5, 1.0, 1.0],
+        let code = |objective, residual2, nonzeros| CodeScore {
+            objective,
+            residual2,
+            nonzeros,
         };
+        let codes = [
+            code(0.5, 1.0, 1),
+            code(0.1, 0.5, 2),
+            code(0.2, 0.5, 0),
+            code(0.3, 1.0, 1),
+            code(9.0, 1.0, 1),
+        ];
         let errors = Errors::of(&codes, 16.0);
         assert_eq!(errors.frobenius, 2.0);
         assert_eq!(errors.relative, 0.5);

@@ -134,7 +134,7 @@ impl<'a, const B: usize> Lanczos<'a, B> {
 
     /// Removes the older basis from the current block and from the new one W = Q (with factor `r`), in one pass;
     /// returns the new factor.
-    fn reorthogonalise(&mut self, w: &mut Vec<[f64; B]>, r: &Small<B>) -> Result<Small<B>, SpectralError> {
+    fn reorthogonalise(&mut self, w: &mut [[f64; B]], r: &Small<B>) -> Result<Small<B>, SpectralError> {
         let older = self.basis.columns() - B;
         let mut pair: Vec<[[f64; B]; 2]> = self.current.iter().zip(w.iter()).map(|(c, w)| [*c, *w]).collect();
         let found = self.basis.project_out::<B, 2>(self.simd, older, &mut pair);

@@ -89,8 +89,8 @@ impl<const B: usize> Loss<B> {
         self.next.push(identity());
         std::mem::swap(&mut self.previous, &mut self.current);
         std::mem::swap(&mut self.current, &mut self.next);
-        // Negated so that a NaN asks for re-orthogonalisation.
-        !(self.estimate <= LIMIT)
+        // A NaN asks for re-orthogonalisation too.
+        self.estimate.is_nan() || self.estimate > LIMIT
     }
 
     /// After the current and the new block of step j were re-orthogonalised, `found` the largest product seen.

@@ -212,11 +212,22 @@ fn limits_are_checked_before_anything_is_loaded() {
     let mut stl = binary_stl(b"");
     stl[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
     let error = read_as(&stl, Some(Format::Stl)).expect_err("a promise");
-    assert!(matches!(error, MeshError::TooLarge { found: 4_294_967_295, .. }), "{error}");
+    assert!(
+        matches!(
+            error,
+            MeshError::TooLarge {
+                found: 4_294_967_295,
+                ..
+            }
+        ),
+        "{error}"
+    );
     stl[80..84].copy_from_slice(&1_000_000u32.to_le_bytes());
     let error = read_as(&stl, Some(Format::Stl)).expect_err("a promise");
     assert!(
-        error.to_string().contains("1000000 triangles, but there are bytes for 4"),
+        error
+            .to_string()
+            .contains("1000000 triangles, but there are bytes for 4"),
         "{error}"
     );
 }
