@@ -83,7 +83,7 @@ fn coding(criterion: &mut Criterion) {
                     black_box(score_signals(
                         &mut workspace,
                         &dictionary,
-                        &Signals::new(query.as_ref()).expect("the signals are finite"),
+                        &ready,
                         lambda,
                         &cancel,
                     ))
