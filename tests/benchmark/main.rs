@@ -1,0 +1,192 @@
+//! The deformations do what their names say, and an evaluation tells right from wrong.
+
+use shapelex::benchmark::deform::Deformation;
+use shapelex::benchmark::{LabelledShape, Protocol, evaluate};
+use shapelex::cancel::Cancel;
+use shapelex::mesh::trimesh::face_area;
+use shapelex::mesh::{Components, PrepareOptions, PrepareReport, TriangleSoup, prepare};
+use shapelex::parameters::{Parameters, Preset};
+use shapelex::pipeline::describe_both;
+use shapelex::sample::{Species, ZooOptions};
+use std::collections::BTreeSet;
+
+const SMALL: ZooOptions = ZooOptions {
+    min_vertices: 700,
+    max_vertices: 1000,
+    upright: false,
+};
+
+fn creature(species: usize, pose: usize) -> TriangleSoup {
+    Species::named()[species].pose(1, pose, &SMALL).unwrap()
+}
+
+fn area(mesh: &TriangleSoup) -> f64 {
+    mesh.faces.iter().map(|f| face_area(&mesh.vertices, f)).sum()
+}
+
+fn used(mesh: &TriangleSoup) -> usize {
+    mesh.faces.iter().flatten().collect::<BTreeSet<_>>().len()
+}
+
+fn report(mesh: TriangleSoup) -> PrepareReport {
+    let options = PrepareOptions {
+        components: Components::Largest,
+        fill_holes_below: 0.0,
+        working_size: 0,
+    };
+    prepare(mesh, &options).unwrap().1
+}
+
+#[test]
+fn every_deformation_is_a_function_of_its_seed_and_leaves_a_shape() {
+    let null = creature(0, 0);
+    for deformation in Deformation::ALL {
+        for strength in Deformation::STRENGTHS {
+            let first = deformation.apply(&null, strength, 7);
+            assert_eq!(
+                first,
+                deformation.apply(&null, strength, 7),
+                "{} {strength}",
+                deformation.name()
+            );
+            assert_ne!(first, null, "{} {strength}", deformation.name());
+            assert!(report(first).vertices > 50, "{} {strength}", deformation.name());
+        }
+    }
+}
+
+#[test]
+fn strengths_go_as_far_as_the_paper_says() {
+    let null = creature(1, 0);
+    let share = |d: Deformation, s| area(&d.apply(&null, s, 3)) / area(&null);
+    // The paper's scale factors, squared.
+    for (strength, factor) in [(1, 0.5f64), (2, 0.875), (3, 1.25), (4, 1.625), (5, 2.0)] {
+        assert!((share(Deformation::Scale, strength) - factor * factor).abs() < 1e-9);
+    }
+    // Less than a fifth of the points at the strongest.
+    let left = used(&Deformation::Sampling.apply(&null, 5, 3)) as f64 / used(&null) as f64;
+    assert!(left < 0.2, "{left} of the vertices are left");
+    assert!(share(Deformation::Holes, 5) < share(Deformation::Holes, 1));
+    assert!(share(Deformation::MicroHoles, 5) < share(Deformation::MicroHoles, 1));
+    // One side of a closed surface is about half of it, and open.
+    for strength in Deformation::STRENGTHS {
+        let view = Deformation::View.apply(&null, strength, 3);
+        let seen = area(&view) / area(&null);
+        assert!((0.25..0.7).contains(&seen), "a view shows {seen} of the area");
+        assert!(report(view).openness > 2.5);
+    }
+    // Welding makes one vertex of two, three pairs per strength, and only stretches what is around them.
+    let welded = Deformation::Topology.apply(&null, 5, 3);
+    assert_eq!(used(&welded), used(&null) - 15);
+    let stretched = area(&welded) / area(&null);
+    assert!(
+        (1.0..1.6).contains(&stretched),
+        "the area is {stretched} of the null's"
+    );
+    // Noise moves everything a little, shot noise a little far.
+    let moved = |d: Deformation| {
+        let to = d.apply(&null, 5, 3);
+        to.vertices
+            .iter()
+            .zip(&null.vertices)
+            .filter(|(a, b)| a != b)
+            .count() as f64
+            / null.vertices.len() as f64
+    };
+    assert!(moved(Deformation::Noise) > 0.99);
+    assert!((0.01..0.1).contains(&moved(Deformation::ShotNoise)));
+}
+
+fn labelled(species: &[usize], poses: usize, parameters: &Parameters) -> Vec<LabelledShape> {
+    let mut shapes = Vec::new();
+    for &s in species {
+        for pose in 0..poses {
+            let (training, query) = describe_both(creature(s, pose), parameters, &Cancel::new()).unwrap();
+            let class = Species::named()[s].name().to_owned();
+            shapes.push(LabelledShape {
+                class,
+                name: format!("pose{pose}"),
+                training,
+                query,
+            });
+        }
+    }
+    shapes
+}
+
+#[test]
+fn an_evaluation_counts_right_and_wrong() {
+    let parameters = Parameters {
+        atoms: 32,
+        ..Parameters::preset(Preset::Default)
+    };
+    let mut shapes = labelled(&[0, 4, 7], 3, &parameters);
+    let run = |shapes: &[LabelledShape], same: &[Vec<String>]| {
+        evaluate(
+            shapes,
+            Protocol::LeaveOneOut,
+            &parameters,
+            same,
+            &Cancel::new(),
+            &|_, _| (),
+        )
+        .unwrap()
+    };
+    let right = run(&shapes, &[]);
+    assert_eq!((right.correct, right.total), (9, 9));
+    assert_eq!(right, run(&shapes, &[]), "the same twice");
+    // A shape under a wrong label is taken for what it is, and counts as a mistake unless the two are the same.
+    let (wrong, true_class) = (shapes[3].class.clone(), shapes[0].class.clone());
+    shapes[0].class.clone_from(&wrong);
+    shapes[0].name = "impostor".into();
+    let mixed = run(&shapes, &[]);
+    assert_eq!(mixed.confusion[&wrong][&true_class], 1);
+    assert_eq!(mixed.queries[0].name, "impostor", "the worst comes first");
+    assert!(mixed.queries[0].error_margin > 0.0 && !mixed.queries[0].correct);
+    let excused = run(&shapes, &[vec![wrong, true_class]]);
+    assert_eq!(excused.correct, excused.total);
+}
+
+#[test]
+fn the_robust_preset_undoes_affine_maps_of_a_known_mesh_and_sees_views() {
+    let robust = Parameters {
+        atoms: 32,
+        ..Parameters::preset(Preset::Robust)
+    };
+    let nulls = labelled(&[0, 4, 7], 1, &robust);
+    let training: Vec<LabelledShape> = nulls
+        .iter()
+        .flat_map(|null| {
+            // The null trains; a strong affine map of it, of the same class, is what is asked about.
+            let species = Species::named()
+                .iter()
+                .position(|s| s.name() == null.class)
+                .unwrap();
+            let deformed = Deformation::Affine.apply(&creature(species, 0), 5, 11);
+            let (training, query) = describe_both(deformed, &robust, &Cancel::new()).unwrap();
+            [
+                null.clone(),
+                LabelledShape {
+                    class: null.class.clone(),
+                    name: "pose1".into(),
+                    training,
+                    query,
+                },
+            ]
+        })
+        .collect();
+    let answer = evaluate(
+        &training,
+        Protocol::EvenOdd,
+        &robust,
+        &[],
+        &Cancel::new(),
+        &|_, _| (),
+    )
+    .unwrap();
+    assert_eq!((answer.correct, answer.total), (3, 3), "{:?}", answer.queries);
+    // A view is open, so it is described under the areas assumed too.
+    let view = Deformation::View.apply(&creature(4, 0), 1, 5);
+    let (_, query) = describe_both(view, &robust, &Cancel::new()).unwrap();
+    assert_eq!(query.views.len(), 6, "plain, whitened, and four areas");
+}
