@@ -2,7 +2,12 @@
 
 pub mod deform;
 pub mod evaluate;
+pub mod measures;
+pub mod paper;
 pub mod protocol;
+pub mod report;
 
 pub use evaluate::{Evaluation, LabelledShape, QueryResult, evaluate};
+pub use measures::RetrievalMeasures;
 pub use protocol::{Protocol, Round, rounds};
+pub use report::BenchmarkReport;
