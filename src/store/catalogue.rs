@@ -142,7 +142,43 @@ impl Store {
             .and_then(|candidates| {
                 let mut writer = self.inner.writer();
                 self.class(class)?;
-                self.add_candidates(&mut writer, class, candidates, at)
+                let added = self.told_apart(class, candidates)?;
+                let shapes = fresh(&added);
+                if !shapes.is_empty() {
+                    self.happen(&mut writer, &Event::ShapesAdded { class, shapes, at })?;
+                }
+                Ok(added)
+            });
+        drop(gate);
+        if added.is_err() {
+            self.remove_unreferenced(written.into_values());
+        }
+        added
+    }
+
+    /// Makes a class with its first shapes: both or, where it fails or the process dies, neither.
+    ///
+    /// # Errors
+    /// [`StoreError::NameTaken`]; [`StoreError::Full`]; [`StoreError::ReadOnly`]; the write's failure.
+    pub fn create_filled_class(
+        &self,
+        name: ClassName,
+        shapes: Vec<NewShape>,
+    ) -> Result<Vec<AddedShape>, StoreError> {
+        self.inner.writable()?;
+        self.require_free(&name)?;
+        let gate = self.inner.files.read().unwrap_or_else(PoisonError::into_inner);
+        let (id, at) = (ClassId::new(), Timestamp::now());
+        let mut written = BTreeMap::new();
+        let added = self
+            .write_files(id, &shapes, at, &mut written)
+            .and_then(|candidates| {
+                let mut writer = self.inner.writer();
+                self.require_free(&name)?;
+                let added = self.told_apart(id, candidates)?;
+                let shapes = fresh(&added);
+                self.happen(&mut writer, &Event::ClassFilled { id, name, shapes, at })?;
+                Ok(added)
             });
         drop(gate);
         if added.is_err() {
@@ -198,13 +234,8 @@ impl Store {
             .collect()
     }
 
-    fn add_candidates(
-        &self,
-        writer: &mut Writer,
-        class: ClassId,
-        candidates: Vec<Shape>,
-        at: Timestamp,
-    ) -> Result<Vec<AddedShape>, StoreError> {
+    /// Which of the candidates are new and which the class has already; equal candidates are one shape.
+    fn told_apart(&self, class: ClassId, candidates: Vec<Shape>) -> Result<Vec<AddedShape>, StoreError> {
         let mut fresh: BTreeMap<ContentHash, Shape> = BTreeMap::new();
         let mut added = Vec::with_capacity(candidates.len());
         for shape in candidates {
@@ -224,14 +255,6 @@ impl Store {
                     AddedShape { shape, created: true }
                 }
             });
-        }
-        let shapes: Vec<Shape> = added
-            .iter()
-            .filter(|a| a.created)
-            .map(|a| a.shape.clone())
-            .collect();
-        if !shapes.is_empty() {
-            self.happen(writer, &Event::ShapesAdded { class, shapes, at })?;
         }
         Ok(added)
     }
@@ -322,4 +345,13 @@ impl Store {
             }
         }
     }
+}
+
+/// The shapes that are new.
+fn fresh(added: &[AddedShape]) -> Vec<Shape> {
+    added
+        .iter()
+        .filter(|a| a.created)
+        .map(|a| a.shape.clone())
+        .collect()
 }

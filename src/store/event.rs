@@ -21,6 +21,13 @@ pub enum Event {
         name: ClassName,
         at: Timestamp,
     },
+    /// A class was made together with its first shapes, so that a crash leaves no empty class behind.
+    ClassFilled {
+        id: ClassId,
+        name: ClassName,
+        shapes: Vec<Shape>,
+        at: Timestamp,
+    },
     /// A class got another name.
     ClassRenamed {
         id: ClassId,
@@ -108,17 +115,20 @@ pub(super) fn stage(backend: &dyn Backend, event: &Event) -> Result<Batch, Store
     match event {
         Event::ClassCreated { id, name, at } => {
             if read_class(*id)?.is_none() {
-                let class = Class {
-                    id: *id,
-                    name: name.clone(),
-                    revision: 0,
-                    shapes: 0,
-                    bytes: 0,
-                    created_at: *at,
-                    updated_at: *at,
-                };
-                put(&mut batch, keys::class(*id), &class)?;
+                put(&mut batch, keys::class(*id), &new_class(*id, name, *at))?;
                 put(&mut batch, keys::name(name), &NameLink::to_class(*id))?;
+            }
+        }
+        Event::ClassFilled { id, name, shapes, at } => {
+            if read_class(*id)?.is_none() {
+                let mut class = new_class(*id, name, *at);
+                for shape in shapes {
+                    put_shape(&mut batch, shape)?;
+                    class.shapes += 1;
+                    class.bytes += shape.bytes;
+                }
+                put(&mut batch, keys::name(name), &NameLink::to_class(*id))?;
+                touch(&mut batch, class, 0, *at)?;
             }
         }
         Event::ClassRenamed { id, name, at } => {
@@ -187,6 +197,18 @@ pub(super) fn stage(backend: &dyn Backend, event: &Event) -> Result<Batch, Store
         }
     }
     Ok(batch)
+}
+
+fn new_class(id: ClassId, name: &ClassName, at: Timestamp) -> Class {
+    Class {
+        id,
+        name: name.clone(),
+        revision: 0,
+        shapes: 0,
+        bytes: 0,
+        created_at: at,
+        updated_at: at,
+    }
 }
 
 /// Writes a class whose shapes changed, with the next revision.

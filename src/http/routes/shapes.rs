@@ -212,25 +212,17 @@ fn store(
     shapes: Vec<NewShape>,
 ) -> Result<(Class, Vec<AddedShape>), Problem> {
     let _alone = parts.catalogue.lock().unwrap_or_else(PoisonError::into_inner);
-    let mut made = None;
     let found = match find_class(&parts.store, class) {
         Err(problem) if create && problem.code == Code::ClassNotFound => {
-            let class = parts.store.create_class(ClassName::new(class)?)?;
-            made = Some(class.id);
-            class
+            let added = parts.store.create_filled_class(ClassName::new(class)?, shapes)?;
+            // A mesh was sent, else the upload had been refused, so there is a shape that names its class.
+            let made = added.first().map(|a| a.shape.class).ok_or(problem)?;
+            return Ok((parts.store.class(made)?, added));
         }
         found => found?,
     };
-    match parts.store.add_shapes(found.id, shapes) {
-        Ok(added) => Ok((parts.store.class(found.id)?, added)),
-        Err(error) => {
-            if let Some(id) = made {
-                // Nothing may stay of a refused upload; where this fails too, the store is read-only and says so.
-                let _ = parts.store.delete_class(id);
-            }
-            Err(error.into())
-        }
-    }
+    let added = parts.store.add_shapes(found.id, shapes)?;
+    Ok((parts.store.class(found.id)?, added))
 }
 
 /// List shapes
