@@ -52,13 +52,13 @@ pub enum ConfigError {
 }
 
 macro_rules! settings {
-    ($($(#[doc = $help:literal])+ $field:ident : $type:ty = $default:expr, $env:literal, $value:literal $(, $parser:path)?;)*) => {
+    ($($(#[doc = $help:literal])+ $field:ident : $type:ty = $default:expr, $env:literal, $value:literal $(, $extra:ident = $setting:expr)*;)*) => {
         /// Settings of one source; `None` where it is silent.
         #[derive(Clone, Debug, Default, PartialEq, clap::Args, Deserialize)]
         #[serde(default, deny_unknown_fields)]
         #[command(next_help_heading = "Settings")]
         pub struct Settings {
-            $($(#[doc = $help])+ #[arg(long, env = $env, value_name = $value $(, value_parser = $parser)?)] pub $field: Option<$type>,)*
+            $($(#[doc = $help])+ #[arg(long, env = $env, value_name = $value $(, $extra = $setting)*)] pub $field: Option<$type>,)*
         }
 
         /// The configuration in force.
@@ -99,12 +99,14 @@ settings! {
     data: PathBuf = PathBuf::from(DEFAULT_DATA), "SHAPELEX_DATA", "DIR";
     /// Address and port to listen on; port 0 takes a free one and says which
     listen: SocketAddr = DEFAULT_LISTEN, "SHAPELEX_LISTEN", "ADDRESS";
+    /// Answer requests without an API key beyond loopback too, as long as no key exists
+    allow_anonymous: bool = false, "SHAPELEX_ALLOW_ANONYMOUS", "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true";
     /// Log level (error, warn, info, debug, trace, off), or a list of target=level
     log: String = "info".to_owned(), "SHAPELEX_LOG", "FILTER";
     /// How log lines are written
     log_format: LogFormat = LogFormat::Text, "SHAPELEX_LOG_FORMAT", "FORMAT";
     /// Preset the first reindex starts from, where it names none
-    preset: Preset = Preset::Default, "SHAPELEX_PRESET", "PRESET", parse_preset;
+    preset: Preset = Preset::Default, "SHAPELEX_PRESET", "PRESET", value_parser = parse_preset;
     /// Longest request body, in MiB
     max_body_mib: usize = 128, "SHAPELEX_MAX_BODY_MIB", "MIB";
     /// Files in one upload, or members of its archive, at most
@@ -207,6 +209,8 @@ impl Config {
         let or_default = |threads: usize, default: usize| if threads == 0 { default } else { threads };
         ServiceConfig {
             listen: self.listen,
+            allow_anonymous: self.allow_anonymous,
+            check_keys: true,
             data_dir: self.data.clone(),
             store: StoreOptions {
                 cache_bytes: self.cache_mib << 20,

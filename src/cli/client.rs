@@ -28,6 +28,9 @@ pub struct TargetArgs {
     /// Running service to work with, such as http://127.0.0.1:7345
     #[arg(long, env = "SHAPELEX_SERVER", value_name = "URL")]
     pub server: Option<String>,
+    /// API key for a running service that asks for one; the environment keeps it out of the process list
+    #[arg(long, env = "SHAPELEX_API_KEY", value_name = "KEY", hide_env_values = true)]
+    pub api_key: Option<String>,
 }
 
 impl TargetArgs {
@@ -37,7 +40,7 @@ impl TargetArgs {
     /// As [`Client::remote`] and [`Client::local`].
     pub fn client(&self) -> Result<Client, CliError> {
         match &self.server {
-            Some(url) => Client::remote(url),
+            Some(url) => Ok(Client::remote(url)?.with_key(self.api_key.clone())),
             None => Client::local(self.data.as_deref()),
         }
     }
@@ -82,6 +85,7 @@ enum Transport {
     Remote {
         agent: ureq::Agent,
         base: String,
+        key: Option<String>,
     },
     Local {
         runtime: tokio::runtime::Runtime,
@@ -107,7 +111,20 @@ impl Client {
             .timeout_connect(Some(Duration::from_secs(10)))
             .build()
             .new_agent();
-        Ok(Self(Transport::Remote { agent, base }))
+        Ok(Self(Transport::Remote {
+            agent,
+            base,
+            key: None,
+        }))
+    }
+
+    /// The same with an API key.
+    #[must_use]
+    pub fn with_key(mut self, secret: Option<String>) -> Self {
+        if let Transport::Remote { key, .. } = &mut self.0 {
+            *key = secret;
+        }
+        self
     }
 
     /// The service inside this process, on a data directory nobody else uses.
@@ -123,6 +140,7 @@ impl Client {
         let mut service = config.service();
         service.indexing_threads = service.query_threads;
         service.query_timeout = Duration::from_secs(24 * 3600);
+        service.check_keys = false;
         service.query_wait = service.query_timeout;
         service.max_body_bytes = service.limits.max_bytes;
         let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -174,12 +192,15 @@ impl Client {
         body: Vec<u8>,
     ) -> Result<(u16, Vec<u8>), CallError> {
         match &self.0 {
-            Transport::Remote { agent, base } => {
+            Transport::Remote { agent, base, key } => {
                 let mut request = ureq::http::Request::builder()
                     .method(method)
                     .uri(format!("{base}{path}"));
                 if let Some(content_type) = content_type {
                     request = request.header("content-type", content_type);
+                }
+                if let Some(key) = key {
+                    request = request.header("authorization", format!("Bearer {key}"));
                 }
                 let unreachable = |error: ureq::Error| CallError::Unreachable(format!("{base}: {error}"));
                 let request = request

@@ -18,6 +18,7 @@ pub mod health;
 pub mod import;
 pub mod index;
 pub mod inspect;
+pub mod keys;
 mod openapi;
 mod output;
 mod parameters;
@@ -74,6 +75,8 @@ pub enum Command {
     Export(export::ExportArgs),
     /// Make dictionaries of a safetensors file the index of a data directory
     Import(import::ImportArgs),
+    /// Make, list and revoke API keys
+    Keys(keys::KeysArgs),
     /// Ask whether a service answers
     Health(health::HealthArgs),
     /// Print the API's OpenAPI document
@@ -120,6 +123,7 @@ fn dispatch(cli: &Cli) -> Result<(), CliError> {
         Command::Zoo(args) => zoo::run(args, json),
         Command::Export(args) => export::run(args, json),
         Command::Import(args) => import::run(args, json),
+        Command::Keys(args) => keys::run(args, json),
         Command::Health(args) => health::run(args, json),
         Command::Openapi => openapi::run(json),
     }

@@ -1,7 +1,7 @@
 //! Starting and ending the service, for `serve` and for `demo`.
 
 use super::CliError;
-use crate::http::{AppState, ServiceConfig, serve};
+use crate::http::{AppState, OpenError, ServiceConfig, serve};
 use std::future::Future;
 use std::net::SocketAddr;
 use tokio::net::TcpListener;
@@ -25,7 +25,10 @@ pub fn run_until(
         let state = tokio::task::spawn_blocking(move || AppState::open(config))
             .await
             .map_err(|error| CliError::Failed(format!("the service did not start: {error}")))?
-            .map_err(|error| CliError::Failed(error.to_string()))?;
+            .map_err(|error| match error {
+                OpenError::Unguarded { .. } => CliError::Usage(error.to_string()),
+                other => CliError::Failed(other.to_string()),
+            })?;
         listening(listener.local_addr()?)?;
         serve(state, listener, shutdown)
             .await

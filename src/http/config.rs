@@ -15,6 +15,10 @@ use std::time::Duration;
 pub struct ServiceConfig {
     /// Where it listens.
     pub listen: SocketAddr,
+    /// Whether requests without a key are answered also where `listen` is not loopback, as long as no key exists.
+    pub allow_anonymous: bool,
+    /// Whether keys are looked at. Not so for callers inside this process, who have the data directory anyway.
+    pub check_keys: bool,
     /// Where it keeps everything.
     pub data_dir: PathBuf,
     /// How the store is opened.
@@ -55,6 +59,8 @@ impl Default for ServiceConfig {
         let jobs = JobOptions::default();
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 7878)),
+            allow_anonymous: false,
+            check_keys: true,
             data_dir: PathBuf::from("shapelex-data"),
             store: StoreOptions::default(),
             max_body_bytes: 128 << 20,

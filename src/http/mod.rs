@@ -6,9 +6,11 @@
 pub mod admission;
 pub mod answer;
 pub mod archive;
+pub mod auth;
 pub mod config;
 pub mod dto;
 pub mod extract;
+pub mod keyring;
 pub mod metrics;
 pub mod openapi;
 pub mod problem;

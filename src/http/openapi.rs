@@ -1,13 +1,17 @@
 //! The API's description, made out of the handlers. `openapi.yaml` at the top level is this document; a test fails
 //! where the two differ, and another one where the route table does.
 
+use super::auth::{Access, access_of};
 use super::dto::problem::ProblemDocument;
 use super::problem::Code;
-use super::routes::{classes, docs, health, index, jobs, query, shapes};
+use super::routes::{classes, docs, health, index, jobs, keys, query, shapes};
 use axum::http::Method;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 use utoipa::openapi::path::{Operation, PathItem};
+use utoipa::openapi::security::{
+    ApiKey, ApiKeyValue, HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme,
+};
 use utoipa::openapi::{Content, Ref, RefOr, Response, ResponseBuilder};
 use utoipa::{Modify, OpenApi};
 
@@ -26,6 +30,7 @@ use utoipa::{Modify, OpenApi};
         (name = "jobs", description = "Learning, in the background"),
         (name = "query", description = "Which class is this?"),
         (name = "index", description = "What has been learnt, and how"),
+        (name = "keys", description = "Who may do what"),
         (name = "operation", description = "For those who run the service"),
         (name = "documents", description = "This description, and a page"),
     ),
@@ -36,11 +41,12 @@ use utoipa::{Modify, OpenApi};
         jobs::start_reindex, jobs::list_jobs, jobs::get_job, jobs::cancel_job, jobs::follow_job,
         query::query_mesh, query::query_batch,
         index::get_index, index::get_parameters,
+        keys::create_key, keys::list_keys, keys::revoke_key,
         health::get_liveness, health::get_readiness, health::get_metrics,
         docs::get_page, docs::get_docs, docs::get_openapi_yaml, docs::get_openapi_json,
     ),
     components(schemas(ProblemDocument)),
-    modifiers(&Problems)
+    modifiers(&Problems, &Keys)
 )]
 struct Document;
 
@@ -128,6 +134,42 @@ impl Modify for Problems {
     }
 }
 
+/// Says what each operation demands of its caller.
+struct Keys;
+
+impl Modify for Keys {
+    fn modify(&self, document: &mut utoipa::openapi::OpenApi) {
+        let components = document.components.get_or_insert_default();
+        let bearer = HttpBuilder::new()
+            .scheme(HttpAuthScheme::Bearer)
+            .description(Some("An API key, `slx_…`"))
+            .build();
+        let header = ApiKeyValue::with_description("X-API-Key", "The same key in a header of its own");
+        components.add_security_scheme("bearer", SecurityScheme::Http(bearer));
+        components.add_security_scheme("api_key", SecurityScheme::ApiKey(ApiKey::Header(header)));
+        for item in document.paths.paths.values_mut() {
+            for (_, operation) in operations_of(item) {
+                let id = operation.operation_id.clone().unwrap_or_default();
+                let Access::Needs(scope) = access_of(&id) else {
+                    operation.security = Some(Vec::new());
+                    continue;
+                };
+                let scope = scope.name();
+                operation.security = Some(vec![
+                    SecurityRequirement::new("bearer", [scope]),
+                    SecurityRequirement::new("api_key", [scope]),
+                    SecurityRequirement::default(),
+                ]);
+                let description = operation.description.get_or_insert_default();
+                if !description.is_empty() {
+                    description.push_str("\n\n");
+                }
+                description.push_str(&format!("Where keys are on, a key of scope `{scope}`."));
+            }
+        }
+    }
+}
+
 fn problem_response(codes: &[Code]) -> Response {
     let lines: Vec<String> = codes
         .iter()
@@ -188,6 +230,9 @@ fn problems_of(operation: &str) -> Vec<Code> {
             ],
         ]
         .concat(),
+        "create_key" => [JSON, WRITE, &[InvalidName, KeyExists, TooManyKeys]].concat(),
+        "list_keys" => vec![InvalidQuery, InvalidCursor],
+        "revoke_key" => [WRITE, &[InvalidRequest, KeyNotFound, LastAdminKey]].concat(),
         "list_jobs" => vec![InvalidQuery, InvalidCursor],
         "get_job" | "follow_job" => vec![InvalidRequest, JobNotFound],
         "cancel_job" => [WRITE, &[InvalidRequest, JobNotFound, JobFinished]].concat(),
@@ -201,6 +246,9 @@ fn problems_of(operation: &str) -> Vec<Code> {
         "query_batch" => [UPLOAD, &[IndexEmpty]].concat(),
         _ => vec![],
     };
+    if access_of(operation) != Access::Public {
+        codes.extend([Unauthorized, InsufficientScope]);
+    }
     codes.push(Internal);
     codes
 }

@@ -45,6 +45,8 @@ codes! {
     InvalidField, "invalid_field", 422, "A field is unknown, missing or has a wrong value";
     InvalidName, "invalid_name", 422, "The name is not acceptable";
     InvalidParameter, "invalid_parameter", 422, "A parameter is outside its range";
+    Unauthorized, "unauthorized", 401, "A valid API key is needed";
+    InsufficientScope, "insufficient_scope", 403, "The API key does not allow this";
     RouteNotFound, "route_not_found", 404, "There is nothing at this address";
     MethodNotAllowed, "method_not_allowed", 405, "This address does not answer that method";
     RequestTimeout, "request_timeout", 408, "The request took too long to arrive";
@@ -85,6 +87,11 @@ codes! {
     ClassExists, "class_exists", 409, "A class of that name exists";
     JobFinished, "job_finished", 409, "The job has ended and cannot be cancelled";
     RevisionMismatch, "revision_mismatch", 412, "The class has changed since it was read";
+    // --- API keys ---
+    KeyNotFound, "key_not_found", 404, "There is no such API key";
+    KeyExists, "key_exists", 409, "An API key of that name exists";
+    TooManyKeys, "too_many_keys", 409, "There are as many API keys as there may be";
+    LastAdminKey, "last_admin_key", 409, "The last key of scope admin cannot go while there are others";
     // --- the index ---
     IndexEmpty, "index_empty", 409, "No class is indexed yet";
     NothingToIndex, "nothing_to_index", 409, "There are no shapes to learn from";
@@ -175,10 +182,22 @@ impl Problem {
             HeaderValue::from_static("application/problem+json"),
         );
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+        if let Some(challenge) = self.challenge() {
+            headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static(challenge));
+        }
         if let Some(seconds) = self.retry_after() {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
         }
         response
+    }
+
+    /// What RFC 6750 wants beside a refusal.
+    fn challenge(&self) -> Option<&'static str> {
+        match self.code {
+            Code::Unauthorized => Some("Bearer realm=\"shapelex\""),
+            Code::InsufficientScope => Some("Bearer realm=\"shapelex\", error=\"insufficient_scope\""),
+            _ => None,
+        }
     }
 
     /// Seconds after which trying again makes sense; every 503 says so.

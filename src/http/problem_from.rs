@@ -4,7 +4,7 @@ use super::problem::{Code, Problem};
 use crate::coding::CodingError;
 use crate::jobs::JobError;
 use crate::mesh::MeshError;
-use crate::model::ClassNameError;
+use crate::model::{ClassNameError, KeyNameError};
 use crate::parameters::ParameterError;
 use crate::pipeline::PipelineError;
 use crate::ranking::RankingError;
@@ -128,6 +128,11 @@ impl From<StoreError> for Problem {
             StoreError::NameTaken { name, id } => Self::new(Code::ClassExists, detail)
                 .with("name", name.to_string())
                 .with("class", id.to_string()),
+            StoreError::NoKey { .. } => Self::new(Code::KeyNotFound, detail),
+            StoreError::KeyNameTaken { name, id } => Self::new(Code::KeyExists, detail)
+                .with("name", name.to_string())
+                .with("key", id.to_string()),
+            StoreError::TooManyKeys { limit } => Self::new(Code::TooManyKeys, detail).with("limit", limit),
             StoreError::Full { .. } => Self::new(
                 Code::StorageFull,
                 "the disk is full; nothing was changed. Free some space and try again",
@@ -171,6 +176,12 @@ impl From<JobError> for Problem {
 
 impl From<ClassNameError> for Problem {
     fn from(error: ClassNameError) -> Self {
+        Self::new(Code::InvalidName, error.to_string())
+    }
+}
+
+impl From<KeyNameError> for Problem {
+    fn from(error: KeyNameError) -> Self {
         Self::new(Code::InvalidName, error.to_string())
     }
 }

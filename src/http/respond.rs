@@ -1,5 +1,6 @@
 //! What happens around every handler: a request id, a span, metrics, and a problem document for whatever failed.
 
+use super::auth::{Access, access_of, authorize};
 use super::metrics;
 use super::problem::{Code, Problem};
 use super::state::AppState;
@@ -9,6 +10,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use std::time::Instant;
 use tracing::Instrument;
+use tracing::field::Empty;
 
 /// The header a request id comes in by and goes out by.
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
@@ -28,9 +30,23 @@ pub async fn around(State(state): State<AppState>, mut request: Request, next: N
     let operation = operation(&request);
     let method = request.method().clone();
     let path = request.uri().path().to_owned();
-    let span = tracing::info_span!("request", request_id = %id, operation, %method, path);
+    let access = match request.extensions().get::<MatchedPath>() {
+        // The answers to unknown addresses tell nothing.
+        None => Access::Public,
+        Some(_) => access_of(operation),
+    };
+    let span = tracing::info_span!("request", request_id = %id, operation, %method, path, key = Empty);
     let began = Instant::now();
-    let response = next.run(request).instrument(span.clone()).await;
+    let response = match authorize(&state, request.headers(), access) {
+        Ok(caller) => {
+            if caller.key.is_some() {
+                span.record("key", caller.name());
+            }
+            request.extensions_mut().insert(caller);
+            next.run(request).instrument(span.clone()).await
+        }
+        Err(problem) => problem.into_response(),
+    };
     let took = began.elapsed();
     let mut response = span.in_scope(|| finish(response, &id));
     let status = response.status();
@@ -101,6 +117,8 @@ fn finish(mut response: Response, id: &str) -> Response {
 /// A problem for a failure that axum or a layer answered by itself.
 fn from_status(status: StatusCode) -> Problem {
     let code = match status {
+        StatusCode::UNAUTHORIZED => Code::Unauthorized,
+        StatusCode::FORBIDDEN => Code::InsufficientScope,
         StatusCode::NOT_FOUND => Code::RouteNotFound,
         StatusCode::METHOD_NOT_ALLOWED => Code::MethodNotAllowed,
         StatusCode::REQUEST_TIMEOUT => Code::RequestTimeout,

@@ -1,12 +1,12 @@
 //! The route table.
 
 use super::respond::{around, panicked, route_not_found};
-use super::routes::{classes, docs, health, index, jobs, query, shapes};
+use super::routes::{classes, docs, health, index, jobs, keys, query, shapes};
 use super::state::AppState;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::middleware::from_fn_with_state;
-use axum::routing::{get, post};
+use axum::routing::{delete, get, post};
 use tower_http::catch_panic::CatchPanicLayer;
 
 /// Every route of the service.
@@ -43,6 +43,8 @@ pub fn router(state: AppState) -> Router {
         .route("/v1/query/batch", post(query::query_batch))
         .route("/v1/index", get(index::get_index))
         .route("/v1/parameters", get(index::get_parameters))
+        .route("/v1/keys", get(keys::list_keys).post(keys::create_key))
+        .route("/v1/keys/{key}", delete(keys::revoke_key))
         .route("/healthz", get(health::get_liveness))
         .route("/readyz", get(health::get_readiness))
         .route("/metrics", get(health::get_metrics))

@@ -1,11 +1,14 @@
 //! What every handler shares.
 
 use super::admission::{Compute, ComputeOptions};
+use super::auth;
 use super::config::ServiceConfig;
+use super::keyring::Keyring;
 use super::problem::Problem;
 use super::{metrics, openapi};
 use crate::jobs::{JobError, Jobs};
 use crate::store::{Health, Store, StoreError};
+use std::net::SocketAddr;
 use std::ops::Deref;
 use std::sync::{Arc, Mutex};
 use tokio_util::sync::CancellationToken;
@@ -22,6 +25,17 @@ pub enum OpenError {
     /// The system gives no threads.
     #[error("the query threads could not be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// Anyone could use it.
+    #[error(
+        "listening on {listen} lets others in, and there is no API key yet; make one with `shapelex keys create admin \
+         --scope admin --data {}`, or let everyone in with --allow-anonymous", data.display()
+    )]
+    Unguarded {
+        /// Where it would listen.
+        listen: SocketAddr,
+        /// Its data directory.
+        data: std::path::PathBuf,
+    },
     /// The API's document could not be written.
     #[error("the OpenAPI document could not be written: {0}")]
     Document(String),
@@ -37,6 +51,8 @@ pub struct Parts {
     pub config: ServiceConfig,
     /// Classes, shapes, generations.
     pub store: Store,
+    /// The API keys.
+    pub keys: Keyring,
     /// The job queue and the live index.
     pub jobs: Jobs,
     /// Where requests compute.
@@ -87,6 +103,13 @@ impl AppState {
         for line in store.recovery() {
             tracing::warn!(recovered = line, "the data directory was repaired");
         }
+        let keys = Keyring::new(store.api_keys()?);
+        if auth::needs_a_key_to_start(&config) && keys.is_empty() {
+            return Err(OpenError::Unguarded {
+                listen: config.listen,
+                data: config.data_dir,
+            });
+        }
         let jobs = Jobs::start(store.clone(), config.job_options())?;
         let compute = Compute::new(ComputeOptions {
             threads: config.query_threads,
@@ -96,6 +119,7 @@ impl AppState {
         Ok(Self(Arc::new(Parts {
             config,
             store,
+            keys,
             jobs,
             compute,
             catalogue: Mutex::new(()),

@@ -82,6 +82,7 @@ macro_rules! identifier {
 identifier!(ClassId, "a class");
 identifier!(ShapeId, "a training shape");
 identifier!(JobId, "a job");
+identifier!(KeyId, "an API key");
 
 #[cfg(test)]
 mod tests {

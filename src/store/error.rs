@@ -1,9 +1,9 @@
 //! Why the store could not do what it was asked.
 
-use crate::model::{ClassId, ClassName, JobId, ShapeId};
+use crate::model::{ClassId, ClassName, JobId, KeyId, KeyName, ShapeId};
 use std::path::PathBuf;
 
-/// The store's errors. Those up to [`StoreError::NameTaken`] are the caller's; the others are the machine's.
+/// The store's errors. Those up to [`StoreError::TooManyKeys`] are the caller's; the others are the machine's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StoreError {
     /// There is no such class.
@@ -31,6 +31,26 @@ pub enum StoreError {
         name: ClassName,
         /// The class that has it.
         id: ClassId,
+    },
+    /// There is no such API key.
+    #[error("there is no API key {id}")]
+    NoKey {
+        /// The identifier asked for.
+        id: KeyId,
+    },
+    /// Another API key has this name.
+    #[error("there is an API key named '{name}' already, {id}")]
+    KeyNameTaken {
+        /// The name.
+        name: KeyName,
+        /// The key that has it.
+        id: KeyId,
+    },
+    /// There are as many API keys as there may be.
+    #[error("there are {limit} API keys, as many as may; revoke those nobody uses")]
+    TooManyKeys {
+        /// The most there may be.
+        limit: usize,
     },
     /// The disk is full. Nothing was changed.
     #[error("the disk is full: {detail}")]

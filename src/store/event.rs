@@ -6,7 +6,7 @@ use super::backend::{Backend, Batch};
 use super::payload::{IdentityLink, NameLink, Number, OwnerLink, ReferenceLink};
 use super::record::{Record, seal, unseal};
 use super::{StoreError, keys};
-use crate::model::{Class, ClassId, ClassName, ContentHash, Shape, ShapeId};
+use crate::model::{ApiKey, Class, ClassId, ClassName, ContentHash, KeyId, Shape, ShapeId};
 use crate::parameters::Parameters;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -57,6 +57,10 @@ pub enum Event {
     ClassRestored { class: Class },
     /// Shapes as they stood when the log was written anew; their class counts them already.
     ShapesRestored { shapes: Vec<Shape> },
+    /// An API key was made, or stood when the log was written anew.
+    KeyCreated { key: ApiKey },
+    /// An API key stopped working.
+    KeyRevoked { id: KeyId },
 }
 
 pub(super) fn get<R: Record>(backend: &dyn Backend, key: &[u8]) -> Result<Option<R>, StoreError> {
@@ -195,6 +199,8 @@ pub(super) fn stage(backend: &dyn Backend, event: &Event) -> Result<Batch, Store
                 put_shape(&mut batch, shape)?;
             }
         }
+        Event::KeyCreated { key } => put(&mut batch, keys::api_key(key.id), key)?,
+        Event::KeyRevoked { id } => batch.delete(keys::api_key(*id)),
     }
     Ok(batch)
 }

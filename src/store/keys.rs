@@ -1,7 +1,7 @@
 //! Every key of the store. The first part names the record family; identifiers follow as their raw bytes, so that the
 //! order of keys is the order of creation. `docs/storage.md` lists them with their values.
 
-use crate::model::{ClassId, ClassName, ContentHash, JobId, ShapeId};
+use crate::model::{ClassId, ClassName, ContentHash, JobId, KeyId, ShapeId};
 
 pub(super) const CLASS: &[u8] = b"class/";
 pub(super) const NAME: &[u8] = b"name/";
@@ -13,6 +13,7 @@ pub(super) const DICTIONARY: &[u8] = b"dictionary/";
 pub(super) const GENERATION: &[u8] = b"generation/";
 pub(super) const JOB: &[u8] = b"job/";
 pub(super) const QUEUE: &[u8] = b"queue/";
+pub(super) const API_KEY: &[u8] = b"api-key/";
 
 /// `meta/sequence`: the number of the last catalogue event applied.
 pub(super) const META_SEQUENCE: &[u8] = b"meta/sequence";
@@ -75,4 +76,8 @@ pub(super) fn job(id: JobId) -> Vec<u8> {
 
 pub(super) fn queue(id: JobId) -> Vec<u8> {
     join(&[QUEUE, &id.to_bytes()])
+}
+
+pub(super) fn api_key(id: KeyId) -> Vec<u8> {
+    join(&[API_KEY, &id.to_bytes()])
 }

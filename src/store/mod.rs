@@ -8,6 +8,7 @@
 //! After a failed write the store is read-only ([`Store::health`] says why) until it is opened again, since nobody
 //! knows what a disk holds after a write it refused.
 
+mod api_keys;
 pub mod backend;
 mod catalogue;
 mod catalogue_log;
@@ -30,6 +31,7 @@ pub mod record;
 mod signatures;
 mod sled_backend;
 
+pub use api_keys::MAX_KEYS;
 pub use backend::Backend;
 pub use catalogue::AddedShape;
 pub use dictionaries::Dictionaries;

@@ -176,6 +176,10 @@ fn rewrite_log(backend: &dyn Backend, log: &mut CatalogueLog, last: u64) -> Resu
             events.push(Event::ShapesRestored { shapes });
         }
     }
+    for (key, value) in backend.scan(keys::API_KEY, None, usize::MAX)? {
+        let key = super::record::unseal(&key, &value)?;
+        events.push(Event::KeyCreated { key });
+    }
     log.rewrite(last + 1, &events)?;
     let sequence = last + events.len() as u64;
     let mut batch = Batch::default();

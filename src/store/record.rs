@@ -46,6 +46,8 @@ pub enum Family {
     Queue = 11,
     /// A shape's signatures, in a file of their own.
     Signatures = 12,
+    /// An API key.
+    ApiKey = 13,
 }
 
 /// A value with a family, a version and an encoding.

@@ -19,6 +19,8 @@ fn table() -> String {
         let id = arg.get_id().as_str();
         let Some(default) = defaults.get(id) else { continue };
         let default = match default {
+            serde_json::Value::String(text) if text.is_empty() => "none".to_owned(),
+            serde_json::Value::Array(items) if items.is_empty() => "none".to_owned(),
             serde_json::Value::String(text) => text.clone(),
             other => other.to_string(),
         };

@@ -12,7 +12,7 @@ use tower::ServiceExt;
 pub struct App {
     pub state: AppState,
     pub router: Router,
-    _directory: tempfile::TempDir,
+    _directory: Option<tempfile::TempDir>,
 }
 
 /// An answer, read to its end.
@@ -40,7 +40,16 @@ impl App {
         Self {
             router: router(state.clone()),
             state,
-            _directory: directory,
+            _directory: Some(directory),
+        }
+    }
+
+    /// A service whose directory is the test's.
+    pub fn on(state: AppState) -> Self {
+        Self {
+            router: router(state.clone()),
+            state,
+            _directory: None,
         }
     }
 

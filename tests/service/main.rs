@@ -9,4 +9,5 @@ mod flow;
 mod harness;
 mod meshes;
 mod operation;
+mod security;
 mod uploads;

@@ -4,6 +4,7 @@
 pub mod class;
 pub mod index;
 pub mod job;
+pub mod key;
 pub mod parameters;
 pub mod problem;
 pub mod query;

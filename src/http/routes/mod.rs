@@ -5,5 +5,6 @@ pub mod docs;
 pub mod health;
 pub mod index;
 pub mod jobs;
+pub mod keys;
 pub mod query;
 pub mod shapes;

@@ -1,0 +1,115 @@
+//! Who asks, and whether they may: API keys and their scopes.
+
+use super::config::ServiceConfig;
+use super::problem::{Code, Problem};
+use super::state::Parts;
+use crate::model::{ApiKey, Scope};
+use axum::extract::FromRequestParts;
+use axum::http::request::Parts as RequestParts;
+use axum::http::{HeaderMap, HeaderName, header};
+use jiff::Timestamp;
+use std::convert::Infallible;
+use std::sync::Arc;
+
+/// The other header a key may come in.
+pub const API_KEY: HeaderName = HeaderName::from_static("x-api-key");
+
+/// What an operation demands of whoever calls it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Nothing: probes, pages and the API's description.
+    Public,
+    /// A key of this scope or a greater one, where keys are on.
+    Needs(Scope),
+}
+
+/// What an operation demands. One that is not listed needs the greatest scope, so that a new one is closed until it
+/// is decided about.
+pub fn access_of(operation: &str) -> Access {
+    match operation {
+        "get_liveness" | "get_readiness" | "get_page" | "get_docs" | "get_openapi_yaml"
+        | "get_openapi_json" => Access::Public,
+        "list_classes" | "get_class" | "list_shapes" | "get_shape" | "get_original" | "list_jobs"
+        | "get_job" | "follow_job" | "query_mesh" | "query_batch" | "get_index" | "get_parameters"
+        | "get_metrics" => Access::Needs(Scope::Read),
+        "create_class" | "rename_class" | "delete_class" | "create_shapes" | "delete_shape"
+        | "start_reindex" | "cancel_job" => Access::Needs(Scope::Write),
+        _ => Access::Needs(Scope::Admin),
+    }
+}
+
+/// Who asks: a key, or nobody in particular where keys are off. Among the extensions of every request.
+#[derive(Clone, Debug, Default)]
+pub struct Caller {
+    /// The key.
+    pub key: Option<Arc<ApiKey>>,
+}
+
+impl Caller {
+    /// The key's name, or `anonymous`.
+    pub fn name(&self) -> &str {
+        self.key.as_ref().map_or("anonymous", |key| key.name.as_str())
+    }
+}
+
+impl<S: Send + Sync> FromRequestParts<S> for Caller {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut RequestParts, _: &S) -> Result<Self, Infallible> {
+        Ok(parts.extensions.get::<Self>().cloned().unwrap_or_default())
+    }
+}
+
+/// Whether requests need a key: there is one, there was one since the start, or the address is not loopback and
+/// nobody allowed anonymous callers.
+pub fn keys_are_on(parts: &Parts) -> bool {
+    needs_a_key_to_start(&parts.config) || (parts.config.check_keys && parts.keys.has_seen_a_key())
+}
+
+/// Whether a service with these settings serves nobody without a key.
+pub fn needs_a_key_to_start(config: &ServiceConfig) -> bool {
+    config.check_keys && !config.listen.ip().is_loopback() && !config.allow_anonymous
+}
+
+/// Finds out who asks, and whether they may.
+///
+/// # Errors
+/// `unauthorized`, `insufficient_scope`.
+pub fn authorize(parts: &Parts, headers: &HeaderMap, access: Access) -> Result<Caller, Problem> {
+    let Access::Needs(scope) = access else {
+        return Ok(Caller::default());
+    };
+    if !keys_are_on(parts) {
+        return Ok(Caller::default());
+    }
+    let refuse = |detail: &str| Problem::new(Code::Unauthorized, detail);
+    let secret = presented(headers).ok_or_else(|| {
+        refuse("send an API key, as 'Authorization: Bearer slx_…' or 'X-API-Key: slx_…'; `shapelex keys create` makes one")
+    })?;
+    let key = parts
+        .keys
+        .find(secret)
+        .ok_or_else(|| refuse("the API key is not one of this service's; it may have been revoked"))?;
+    if key.is_expired(Timestamp::now()) {
+        return Err(refuse("the API key has expired"));
+    }
+    if key.scope < scope {
+        let (has, needs) = (key.scope.name(), scope.name());
+        return Err(Problem::new(
+            Code::InsufficientScope,
+            format!("this needs a key of scope '{needs}', '{}' has '{has}'", key.name),
+        )
+        .with("scope", has)
+        .with("needed", needs));
+    }
+    Ok(Caller { key: Some(key) })
+}
+
+/// The secret a request brings. What is not visible ASCII is no secret.
+fn presented(headers: &HeaderMap) -> Option<&str> {
+    let bearer = headers.get(header::AUTHORIZATION).and_then(|value| {
+        let (scheme, secret) = value.to_str().ok()?.split_once(' ')?;
+        scheme.eq_ignore_ascii_case("bearer").then(|| secret.trim())
+    });
+    bearer.or_else(|| headers.get(API_KEY)?.to_str().ok().map(str::trim))
+}
