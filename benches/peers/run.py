@@ -57,12 +57,15 @@ class Table:
             "peer_ms": round(statistics.median(b["ms"] for _, b in pairs), 3),
             "ratio": round(statistics.median(ratios), 2),
             "quartiles": [round(quartiles[0], 2), round(quartiles[2], 2)],
+            "ours_mb": round(statistics.median(a["mb"] for a, _ in pairs)),
+            "peer_mb": round(statistics.median(b["mb"] for _, b in pairs)),
             "agree": bool(agree(*pairs[-1])),
         }
         row = self.rows[name]
         print(
             f"{name:58} {row['ours_ms']:10.2f} {row['peer_ms']:10.2f} {row['ratio']:8.2f} "
-            f"({row['quartiles'][0]:.2f}-{row['quartiles'][1]:.2f})  {'yes' if row['agree'] else 'NO'}",
+            f"({row['quartiles'][0]:.2f}-{row['quartiles'][1]:.2f}) {row['ours_mb']:6} {row['peer_mb']:6}  "
+            f"{'yes' if row['agree'] else 'NO'}",
             flush=True,
         )
 
@@ -112,11 +115,11 @@ def main():
     parser.add_argument("--quick", action="store_true", help="smaller inputs and fewer rounds, under 5 minutes")
     parser.add_argument("--json", action="store_true", help="the last line is one object of all rows")
     parser.add_argument("--threads", default="1,2")
-    parser.add_argument("--rows", default="eigen,lasso,learn,query,read")
+    parser.add_argument("--rows", default="eigen,lasso,learn,query,reindex,read")
     options = parser.parse_args()
     wanted = options.rows.split(",")
     table = Table()
-    print(f"{'':58} {'ours ms':>10} {'peer ms':>10} {'ratio':>8} (quartiles)  agree")
+    print(f"{'':58} {'ours ms':>10} {'peer ms':>10} {'ratio':>8} (quartiles) {'MB':>6} {'peer':>6}  agree")
     with tempfile.TemporaryDirectory() as scratch:
         scratch = Path(scratch)
         zoo = creatures(options.shapelex, scratch / "zoo", 12, 5 if options.quick else 13)
@@ -128,8 +131,8 @@ def main():
                 eigen(table, ours, peer, zoo, scratch, label, options.quick)
             if "lasso" in wanted or "learn" in wanted:
                 coding(table, ours, peer, zoo, scratch, label, options.quick, wanted, threads)
-            if "query" in wanted:
-                whole(table, ours, peer, zoo, scratch, label, options.quick, threads)
+            if "query" in wanted or "reindex" in wanted:
+                whole(table, ours, peer, zoo, scratch, label, options.quick, wanted, threads)
             if "read" in wanted and threads == 1:
                 reading(table, ours, peer, zoo, scratch, options.quick)
     if options.json:
@@ -139,7 +142,7 @@ def main():
 def eigen(table, ours, peer, zoo, scratch, label, quick):
     first = next(iter(zoo.values()))[0]
     inputs = [("zoo", first)]
-    for times in (1, 2) if quick else (1, 2, 3):
+    for times in (1, 2) if quick else (1, 2, 3):  # About 9k, 35k and 140k vertices.
         finer = scratch / f"finer{times}.obj"
         if not finer.exists():
             subdivide(first, finer, times)
@@ -171,7 +174,10 @@ def coding(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
         parts = []
         for i, mesh in enumerate(class_meshes[:5]):
             path = scratch / f"signals{i}"
-            rows, _ = ours(op="describe", mesh=mesh, preset=preset, normalisation=normalisation, signals=str(path))["shape"]
+            # A query is coded at every vertex, a training shape at the preset's sample.
+            whole = {"samples": 0} if i == len(class_meshes[:5]) - 1 else {}
+            describe = dict(mesh=mesh, preset=preset, normalisation=normalisation, signals=str(path), **whole)
+            rows, _ = ours(op="describe", **describe)["shape"]
             parts.append(path)
         held_out = scratch / "held_out"
         held_out.write_bytes(parts[-1].read_bytes()[: 1500 * rows * 8])
@@ -200,22 +206,24 @@ def coding(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
             )
 
 
-def whole(table, ours, peer, zoo, scratch, label, quick, threads):
+def whole(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
     held_out = {name: meshes[-1] for name, meshes in zoo.items()}
     classes = [dict(label=name, meshes=meshes[:-1]) for name, meshes in zoo.items()]
     for preset in ("default", "paper"):
         directory = scratch / f"index-{preset}"
         directory.mkdir(exist_ok=True)
         poses = len(classes[0]["meshes"])
-        if preset == "default" and threads == 2:
+        if preset == "default" and "reindex" in wanted:
             table.measure(
-                f"whole reindex, 12 classes x {poses} shapes, {preset} preset, 2 threads / processes", 1,
+                f"whole reindex, 12 classes x {poses} shapes, {preset} preset, {label} against as many processes", 1,
                 lambda: ours(op="index", preset=preset, classes=classes, out=str(directory)),
                 lambda: peer(op="index", preset=preset, classes=classes),
                 lambda a, b: True,
             )
         else:
             ours(op="index", preset=preset, classes=classes, out=str(directory))
+        if "query" not in wanted:
+            continue
         peer(op="load", preset=preset, dir=str(directory))
         meshes = list(held_out.items())
         turn = {"ours": 0, "theirs": 0}
@@ -235,17 +243,19 @@ def whole(table, ours, peer, zoo, scratch, label, quick, threads):
 
 def reading(table, ours, peer, zoo, scratch, quick):
     big = scratch / "big.obj"
-    subdivide(next(iter(zoo.values()))[0], big, 3 if quick else 4)
+    subdivide(next(iter(zoo.values()))[0], big, 4)  # A million faces.
     peer(op="convert", mesh=str(big), out=str(scratch))
     for kind in ("obj", "ply", "glb"):
         mesh = str(scratch / f"big.{kind}")
-        faces = ours(op="read", mesh=mesh)["faces"]
-        table.measure(
-            f"read {kind.upper()} of {faces} faces, against trimesh", 2 if quick else 4,
-            lambda: ours(op="read", mesh=mesh),
-            lambda: peer(op="read", mesh=mesh),
-            lambda a, b: a["faces"] == b["faces"],
-        )
+        for clean in (False, True):
+            work = dict(op="read", mesh=mesh, clean=clean)
+            faces = ours(**work)["faces"]
+            table.measure(
+                f"{'clean mesh from' if clean else 'read'} {kind.upper()} of {faces} faces", 1 if quick else 4,
+                lambda: ours(**work),
+                lambda: peer(**work),
+                lambda a, b: a["faces"] == b["faces"],
+            )
 
 
 if __name__ == "__main__":

@@ -9,12 +9,11 @@
 
 use super::cholesky::{Factor, dot};
 use super::lasso::column;
+use super::scan::{largest_magnitude, place_of, step_along};
 use faer::MatRef;
 
 /// Atoms added per look at the gradient: more saves looks, fewer saves atoms that must leave again.
-const ADDED_AT_ONCE: usize = 3;
-/// Atoms passed over together where none of them can violate.
-const CHUNK: usize = 32;
+const ADDED_AT_ONCE: usize = 4;
 
 /// One Lasso. Correlations and Gram matrix at single precision find the atoms that matter, and exact ones decide.
 #[derive(Clone, Copy)]
@@ -47,6 +46,10 @@ pub(super) struct ActiveSet {
     signs: Vec<f64>,
     factor: Factor,
     gradient: Vec<f32>,
+    /// Whether correlations are taken at full precision; the search begins with the rough ones.
+    exact: bool,
+    /// max |q_j| over the atoms outside the set, at the last look.
+    largest: f64,
     /// d_jᵀs of the atoms met so far, valid where `known` holds the number of the signal.
     correlation: Vec<f64>,
     known: Vec<u64>,
@@ -55,7 +58,7 @@ pub(super) struct ActiveSet {
     /// F⁻¹ (c_A − λ sign), row by row valid as far as it reaches.
     forward: Vec<f64>,
     column: Vec<f64>,
-    /// Atoms to add, and their gradient.
+    /// Atoms to add, and the value each would take alone.
     added: Vec<(usize, f64)>,
     /// Atoms whose rough gradient does not tell.
     doubtful: Vec<usize>,
@@ -84,15 +87,22 @@ impl ActiveSet {
         self.refused.clear();
         self.signal += 1;
         self.forward.clear();
+        self.exact = false;
         self.restart(problem);
         for _ in 0..limit {
             self.update_gradient(problem);
-            if !self.find_violations(problem) {
-                let bound = problem.lambda + problem.tolerance;
-                let refused = std::mem::take(&mut self.refused);
-                return refused
-                    .iter()
-                    .all(|&j| self.exact_gradient(problem, j).abs() <= bound);
+            let error = self.gradient_error(problem);
+            if !self.find_violations(problem, error) {
+                if !self.exact {
+                    let shift = self.sharpen(problem);
+                    if self.largest + error + shift <= problem.lambda + problem.tolerance {
+                        return self.refused_are_optimal(problem);
+                    }
+                    continue;
+                }
+                if !self.settle_doubts(problem, error) {
+                    return self.refused_are_optimal(problem);
+                }
             }
             self.extend(problem);
             self.descend(problem);
@@ -100,9 +110,46 @@ impl ActiveSet {
         false
     }
 
+    /// Goes over to exact correlations. Returns by how much that changed any d_jᵀDa with ‖d_j‖ ≤ 1, at most: the
+    /// length of the change of F⁻¹(c_A − λ sign), as ‖D_A x‖ = ‖Fᵀx‖; infinity where the set changed.
+    #[inline(always)]
+    fn sharpen(&mut self, problem: &Problem<'_>) -> f64 {
+        self.exact = true;
+        let rough = std::mem::take(&mut self.forward);
+        self.solve_target(problem);
+        let shift2: f64 = rough
+            .iter()
+            .zip(&self.forward)
+            .map(|(x, y)| (x - y) * (x - y))
+            .sum();
+        let kept = self
+            .target
+            .iter()
+            .zip(&self.signs)
+            .all(|(x, sign)| x * sign > 0.0);
+        if kept {
+            self.values.copy_from_slice(&self.target);
+            return shift2.sqrt() * 1.0001;
+        }
+        self.descend(problem);
+        f64::INFINITY
+    }
+
+    #[inline(always)]
+    fn refused_are_optimal(&mut self, problem: &Problem<'_>) -> bool {
+        let bound = problem.lambda + problem.tolerance;
+        let refused = std::mem::take(&mut self.refused);
+        refused
+            .iter()
+            .all(|&j| self.exact_gradient(problem, j).abs() <= bound)
+    }
+
     /// d_jᵀs.
     #[inline(always)]
     pub fn correlation(&mut self, problem: &Problem<'_>, j: usize) -> f64 {
+        if !self.exact {
+            return f64::from(problem.rough_correlation[j]);
+        }
         if self.known[j] != self.signal {
             self.known[j] = self.signal;
             self.correlation[j] = dot(column(problem.atoms, j), problem.signal);
@@ -174,67 +221,85 @@ impl ActiveSet {
         }
     }
 
-    /// Fills `added` with the atoms outside the set that violate |q_j| ≤ λ most, worst first.
+    /// How far the gradient at single precision may be off.
     #[inline(always)]
-    fn find_violations(&mut self, problem: &Problem<'_>) -> bool {
+    fn gradient_error(&self, problem: &Problem<'_>) -> f64 {
         let norm1: f64 = self.values.iter().map(|a| a.abs()).sum();
         let terms = (self.atoms.len() + 1) as f64;
-        let rounding = 4.0 * f64::from(f32::EPSILON) * terms.sqrt() * (problem.norm + norm1);
-        let error = problem.error + rounding;
-        let bound = problem.lambda + problem.tolerance;
-        let (surely, perhaps) = ((bound + error) as f32, (bound - error) as f32);
+        problem.error + 4.0 * f64::from(f32::EPSILON) * terms.sqrt() * (problem.norm + norm1)
+    }
+
+    /// Fills `added` with atoms outside the set that surely violate |q_j| ≤ λ: the worst, then the worst after the
+    /// gradient's change by a step of coordinate descent along the first, and so on. Atoms much like the first are
+    /// no longer among them then.
+    #[inline(always)]
+    fn find_violations(&mut self, problem: &Problem<'_>, error: f64) -> bool {
+        let surely = problem.lambda + problem.tolerance + error;
         self.added.clear();
-        self.doubtful.clear();
         for &j in self.atoms.iter().chain(&self.refused) {
-            self.gradient[j] = 0.0;
+            // Not a number compares as no violation, whatever is added to it.
+            self.gradient[j] = f32::NAN;
         }
-        for (n, chunk) in self.gradient.chunks(CHUNK).enumerate() {
-            let mut any = false;
-            for q in chunk {
-                any |= q.abs() > perhaps;
-            }
-            if !any {
-                continue;
-            }
-            for (k, q) in chunk.iter().enumerate() {
-                if q.abs() > surely {
-                    insert(&mut self.added, n * CHUNK + k, f64::from(*q));
-                } else if q.abs() > perhaps {
-                    self.doubtful.push(n * CHUNK + k);
-                }
-            }
-        }
-        if self.added.is_empty() {
-            for n in 0..self.doubtful.len() {
-                let j = self.doubtful[n];
-                if self.atoms.contains(&j) || self.refused.contains(&j) {
-                    continue;
-                }
-                let gradient = self.exact_gradient(problem, j);
-                if gradient.abs() > bound {
-                    insert(&mut self.added, j, gradient);
-                }
+        let mut largest = largest_magnitude(&self.gradient);
+        self.largest = f64::from(largest);
+        while f64::from(largest) > surely && self.added.len() < ADDED_AT_ONCE {
+            let Some(j) = place_of(&self.gradient, largest) else {
+                break;
+            };
+            let gradient = f64::from(self.gradient[j]);
+            let rough = column(problem.rough_gram, j);
+            let step = (gradient - problem.lambda * gradient.signum()) / f64::from(rough[j]);
+            self.added.push((j, step));
+            self.gradient[j] = f32::NAN;
+            if self.added.len() < ADDED_AT_ONCE {
+                largest = step_along(&mut self.gradient, rough, step as f32);
             }
         }
         !self.added.is_empty()
     }
 
-    /// Puts the atoms of `added` into the set, with value zero and the sign of their gradient.
+    /// Fills `added` with atoms whose rough gradient does not tell and whose exact one violates.
+    #[inline(always)]
+    fn settle_doubts(&mut self, problem: &Problem<'_>, error: f64) -> bool {
+        let bound = problem.lambda + problem.tolerance;
+        let perhaps = (bound - error) as f32;
+        if self.largest <= f64::from(perhaps) {
+            return false;
+        }
+        self.doubtful.clear();
+        for (j, q) in self.gradient.iter().enumerate() {
+            if q.abs() > perhaps {
+                self.doubtful.push(j);
+            }
+        }
+        let mut worst = bound;
+        for n in 0..self.doubtful.len() {
+            let j = self.doubtful[n];
+            let gradient = self.exact_gradient(problem, j);
+            if gradient.abs() > worst {
+                worst = gradient.abs();
+                let step = (gradient - problem.lambda * gradient.signum()) / column(problem.gram, j)[j];
+                self.added.clear();
+                self.added.push((j, step));
+            }
+        }
+        !self.added.is_empty()
+    }
+
+    /// Puts the atoms of `added` into the set, each with its value.
     #[inline(always)]
     fn extend(&mut self, problem: &Problem<'_>) {
         for n in 0..self.added.len() {
-            let (j, gradient) = self.added[n];
-            let sign = gradient.signum();
-            if self.append(problem, j, 0.0, sign) {
+            let (j, value) = self.added[n];
+            let sign = value.signum();
+            if self.append(problem, j, value, sign) {
                 continue;
             }
-            if n > 0 {
-                // The atom depends on the set only since the ones before it came in: its time is the next look.
-                continue;
-            }
-            if !self.exchange(problem, j, sign) {
+            // The steps after this one assume that it was taken.
+            if n == 0 && !self.exchange(problem, j, sign) {
                 self.refused.push(j);
             }
+            break;
         }
     }
 
@@ -314,15 +379,5 @@ impl ActiveSet {
         if k < self.target.len() {
             self.target.remove(k);
         }
-    }
-}
-
-/// Keeps the [`ADDED_AT_ONCE`] atoms of largest gradient, in that order.
-#[inline(always)]
-fn insert(added: &mut Vec<(usize, f64)>, j: usize, gradient: f64) {
-    let place = added.partition_point(|(_, other)| other.abs() >= gradient.abs());
-    if place < ADDED_AT_ONCE {
-        added.truncate(ADDED_AT_ONCE - 1);
-        added.insert(place, (j, gradient));
     }
 }

@@ -10,6 +10,7 @@ mod initialise;
 pub mod kkt;
 pub mod lasso;
 pub mod learn;
+mod scan;
 mod screen;
 pub mod signals;
 

@@ -141,7 +141,7 @@ impl Screen {
             Par::Seq,
         );
         for (norm2, projection) in norms2.iter().zip(memory.projections.chunks_exact(r)) {
-            let kept: f32 = projection.iter().map(|y| y * y).sum();
+            let kept = energy(projection);
             // What single precision cannot tell from zero counts as left out.
             let left_out = (norm2 - f64::from(kept)).max(0.0) + 1e-4 * norm2;
             memory
@@ -149,6 +149,18 @@ impl Screen {
                 .push(self.tail * left_out.sqrt() + rounding * norm2.sqrt() + UNDERFLOW);
         }
     }
+}
+
+/// Σ y², in eight sums side by side.
+fn energy(values: &[f32]) -> f32 {
+    let (chunks, rest) = values.as_chunks::<8>();
+    let mut lanes = [0f32; 8];
+    for chunk in chunks {
+        for (lane, y) in lanes.iter_mut().zip(chunk) {
+            *lane += y * y;
+        }
+    }
+    lanes.iter().sum::<f32>() + rest.iter().map(|y| y * y).sum::<f32>()
 }
 
 /// Atoms that span all atoms to within `tail2` of squared distance, by pivoted Cholesky of their Gram matrix; `None`

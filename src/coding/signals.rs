@@ -51,23 +51,17 @@ impl<'a> Signals<'a> {
         };
         let signals = values.get();
         let (m, n) = (signals.nrows(), signals.ncols());
-        let order = fastest(Chain {
-            summaries: &summaries(signals),
-            length: m,
+        let order = fastest(Chain { signals });
+        let (mut single, mut norms2) = (Mat::zeros(m, n), vec![0.0; n]);
+        fastest(Round {
+            signals,
+            order: &order,
+            single: &mut single,
+            norms2: &mut norms2,
         });
-        let mut single = Mat::zeros(m, n);
-        let mut norms2 = Vec::with_capacity(n);
-        for (k, &i) in order.iter().enumerate() {
-            let signal = column(signals, i);
-            let norm2 = dot(signal, signal);
-            // Beyond this, squares at single precision would overflow.
-            if norm2.is_nan() || norm2 > 1e36 {
-                return Err(CodingError::NotFinite { what: "signature" });
-            }
-            norms2.push(norm2);
-            for (to, from) in single.col_as_slice_mut(k).iter_mut().zip(signal) {
-                *to = *from as f32;
-            }
+        // Beyond this, squares at single precision would overflow.
+        if norms2.iter().any(|norm2| norm2.is_nan() || *norm2 > 1e36) {
+            return Err(CodingError::NotFinite { what: "signature" });
         }
         Ok(Self {
             values,
@@ -112,24 +106,49 @@ impl Values<'_> {
 /// What neighbours are told by: sums over [`SUMMARY`] equal stretches of a signal.
 type Summary = [f32; SUMMARY];
 
-fn summaries(signals: MatRef<'_, f64>) -> Vec<Summary> {
-    let stretch = signals.nrows().div_ceil(SUMMARY).max(1);
-    let summary = |i| {
-        let mut sums = [0.0; SUMMARY];
-        for (sum, values) in sums.iter_mut().zip(column(signals, i).chunks(stretch)) {
-            let (even, odd) = (values.iter().step_by(2), values.iter().skip(1).step_by(2));
-            *sum = (even.sum::<f64>() + odd.sum::<f64>()) as f32;
+#[inline(always)]
+fn summary(signal: &[f64], stretch: usize) -> Summary {
+    let mut sums = [0.0; SUMMARY];
+    for (sum, values) in sums.iter_mut().zip(signal.chunks(stretch)) {
+        let (chunks, rest) = values.as_chunks::<4>();
+        let mut lanes = [0.0; 4];
+        for chunk in chunks {
+            for (lane, value) in lanes.iter_mut().zip(chunk) {
+                *lane += value;
+            }
         }
-        sums
-    };
-    (0..signals.ncols()).map(summary).collect()
+        *sum = ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest.iter().sum::<f64>()) as f32;
+    }
+    sums
 }
 
-/// The greedy chain through all summaries, from the first. The window grows with the length M of a signal, as what a
+/// The signals in `order` at single precision, and their squared norms.
+struct Round<'a> {
+    signals: MatRef<'a, f64>,
+    order: &'a [usize],
+    single: &'a mut Mat<f32>,
+    norms2: &'a mut [f64],
+}
+
+impl Kernel for Round<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (k, (&i, norm2)) in self.order.iter().zip(self.norms2).enumerate() {
+            let signal = column(self.signals, i);
+            *norm2 = dot(signal, signal);
+            for (to, from) in self.single.col_as_slice_mut(k).iter_mut().zip(signal) {
+                *to = *from as f32;
+            }
+        }
+    }
+}
+
+/// The greedy chain through all signals, from the first. The window grows with the length M of a signal, as what a
 /// better neighbour saves does.
 struct Chain<'a> {
-    summaries: &'a [Summary],
-    length: usize,
+    signals: MatRef<'a, f64>,
 }
 
 impl Kernel for Chain<'_> {
@@ -137,7 +156,13 @@ impl Kernel for Chain<'_> {
 
     #[inline(always)]
     fn run(self) -> Vec<usize> {
-        chain(self.summaries, self.length)
+        let (length, count) = (self.signals.nrows(), self.signals.ncols());
+        let stretch = length.div_ceil(SUMMARY).max(1);
+        let mut summaries = Vec::with_capacity(count);
+        for i in 0..count {
+            summaries.push(summary(column(self.signals, i), stretch));
+        }
+        chain(&summaries, length)
     }
 }
 
