@@ -210,6 +210,8 @@ def whole(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
     held_out = {name: meshes[-1] for name, meshes in zoo.items()}
     classes = [dict(label=name, meshes=meshes[:-1]) for name, meshes in zoo.items()]
     for preset in ("default", "paper"):
+        if "query" not in wanted and preset == "paper":
+            continue
         directory = scratch / f"index-{preset}"
         directory.mkdir(exist_ok=True)
         poses = len(classes[0]["meshes"])
