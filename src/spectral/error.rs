@@ -14,7 +14,7 @@ pub enum SpectralError {
     /// The residual or orthogonality check failed after every attempt.
     #[error("the eigen-solve did not reach the requested accuracy: {detail}")]
     NotConverged { detail: String },
-    /// Too few non-zero eigenvalues for a signature.
-    #[error("the mesh has only {found} non-zero eigenvalues, {needed} are needed")]
+    /// Too few different non-zero eigenvalues for a signature; `found` counts equal ones too.
+    #[error("the mesh has {found} non-zero eigenvalues; at least {needed} that differ are needed")]
     TooFewEigenpairs { found: usize, needed: usize },
 }

@@ -12,6 +12,7 @@ mod dense;
 mod lanczos;
 mod loss;
 mod normalised;
+mod parts;
 mod residual;
 mod shift_invert;
 mod simd;

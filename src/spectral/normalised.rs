@@ -131,6 +131,52 @@ impl Normalised {
         }
     }
 
+    /// The vertices of every connected component, ascending; components by their first vertex.
+    pub fn parts(&self) -> Vec<Vec<usize>> {
+        let component = self.components();
+        let count = component.iter().map(|c| c + 1).max().unwrap_or(0);
+        let mut parts = vec![Vec::new(); count];
+        for (vertex, &c) in component.iter().enumerate() {
+            parts[c].push(vertex);
+        }
+        parts
+    }
+
+    /// The diagonal block of one connected component, given by its vertices in ascending order.
+    pub fn block(&self, part: &[usize]) -> Self {
+        let mut pointers = Vec::with_capacity(part.len() + 1);
+        let (mut rows, mut values) = (Vec::new(), Vec::new());
+        pointers.push(0);
+        for &j in part {
+            for (i, value) in self.column(j) {
+                // Outside of the component there are only zeros.
+                if let Ok(row) = part.binary_search(&i) {
+                    rows.push(row);
+                    values.push(value);
+                }
+            }
+            pointers.push(rows.len());
+        }
+        let label: Vec<u32> = part.iter().map(|&i| self.null.label[i]).collect();
+        let has_null = label.iter().any(|&l| l != u32::MAX);
+        Self {
+            n: part.len(),
+            pointers,
+            rows,
+            values,
+            inv_sqrt_mass: part.iter().map(|&i| self.inv_sqrt_mass[i]).collect(),
+            norm: self.norm,
+            null: NullSpace {
+                label: label
+                    .into_iter()
+                    .map(|l| if l == u32::MAX { l } else { 0 })
+                    .collect(),
+                entry: part.iter().map(|&i| self.null.entry[i]).collect(),
+                count: usize::from(has_null),
+            },
+        }
+    }
+
     fn null_space(&self) -> NullSpace {
         let n = self.n;
         let component = self.components();

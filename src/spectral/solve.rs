@@ -7,6 +7,7 @@
 use super::dense;
 use super::lanczos::{Lanczos, Ritz};
 use super::normalised::Normalised;
+use super::parts::smallest_by_parts;
 use super::residual::{self, Check};
 use super::shift_invert::{Analysis, Factor};
 use super::{EigenOptions, SpectralError};
@@ -76,6 +77,25 @@ pub fn estimated_bytes(n: usize, wanted: usize) -> usize {
 
 /// The `wanted` smallest eigenpairs outside the null space, checked.
 pub fn smallest(
+    s: &Normalised,
+    wanted: usize,
+    options: &EigenOptions,
+    cancel: &Cancel,
+) -> Result<Pairs, SpectralError> {
+    if is_dense(s.n, wanted) {
+        return dense_pairs(s, wanted, options);
+    }
+    let parts = s.parts();
+    // More equal pieces than the widest block finds copies of an eigenvalue.
+    if parts.len() > BLOCKS[BLOCKS.len() - 1] {
+        let pairs = smallest_by_parts(s, &parts, wanted, options, cancel, whole)?;
+        return accept(s, pairs, options.tolerance);
+    }
+    whole(s, wanted, options, cancel)
+}
+
+/// As [`smallest`], by one solve.
+fn whole(
     s: &Normalised,
     wanted: usize,
     options: &EigenOptions,

@@ -131,7 +131,8 @@ fn repeated(part: &(Vec<[f64; 3]>, Vec<[u32; 3]>), times: usize) -> (Vec<[f64; 3
 
 #[test]
 fn every_component_has_its_zero() {
-    for (level, times, n) in [(2, 5, 60), (3, 3, 80), (2, 30, 100)] {
+    // The last is more equal pieces than any block finds copies of, in a mesh too large for the dense solver.
+    for (level, times, n) in [(2, 5, 60), (3, 3, 80), (2, 30, 100), (2, 40, 200)] {
         let part = bumpy_sphere(level);
         let (o, pairs) = solve(&mesh(repeated(&part, times)), n);
         assert_sound(&o, &pairs);
