@@ -18,7 +18,7 @@ struct LineOut<'a> {
 }
 
 #[derive(Deserialize)]
-struct LineIn {
+pub(super) struct LineIn {
     sequence: u64,
     event: Event,
 }
@@ -82,7 +82,7 @@ pub fn read(
     Ok(scan)
 }
 
-fn parse(line: &[u8]) -> Result<LineIn, String> {
+pub(super) fn parse(line: &[u8]) -> Result<LineIn, String> {
     let line = line.strip_suffix(b"\n").ok_or("the line has no end")?;
     let (crc, rest) = line.split_at_checked(9).ok_or("the line is too short")?;
     let crc = std::str::from_utf8(&crc[..8])

@@ -21,7 +21,7 @@ const CHANNELS: [(u8, Channel); 3] = [
     (3, Channel::FixedGrid),
 ];
 
-struct DictionaryRecord(Dictionaries);
+pub(super) struct DictionaryRecord(Dictionaries);
 
 impl Record for DictionaryRecord {
     const FAMILY: Family = Family::Dictionary;

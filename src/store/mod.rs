@@ -16,6 +16,9 @@ mod dictionaries;
 pub mod error;
 mod event;
 mod files;
+#[cfg(any(test, feature = "fuzzing"))]
+#[doc(hidden)]
+pub mod fuzzing;
 mod garbage;
 mod generations;
 mod jobs;
