@@ -32,17 +32,20 @@ const FIXED_GRID: DescriptorParameters = DescriptorParameters {
     },
 };
 
-/// A mesh with the spectrum of its plain view, which most views share.
+/// A mesh with the spectra its views are taken from.
 #[derive(Clone, Debug)]
 pub struct PreparedShape {
     mesh: TriMesh,
     operators: Operators,
     eigenpairs: Eigenpairs,
+    /// Of the whitened mesh, where the parameters ask for that hypothesis.
+    whitened: Option<Eigenpairs>,
     report: PrepareReport,
 }
 
 impl PreparedShape {
-    /// Cleans a mesh and solves for its spectrum.
+    /// Cleans a mesh and solves for its spectrum; with the whitened hypothesis also for the whitened mesh's, at the
+    /// same time where the thread pool has room.
     ///
     /// # Errors
     /// The error of the stage that failed, or [`PipelineError::Cancelled`].
@@ -58,17 +61,24 @@ impl PreparedShape {
         observer(Stage::Laplacian);
         let operators = assemble(&mesh)?;
         observer(Stage::Eigenpairs);
-        let eigenpairs = smallest_eigenpairs(
-            &operators,
-            parameters.eigenpairs,
-            &EigenOptions::default(),
-            cancel,
-        )?;
+        let solve = |operators: &Operators| {
+            smallest_eigenpairs(operators, parameters.eigenpairs, &EigenOptions::default(), cancel)
+        };
+        let (eigenpairs, whitened) = if parameters.hypotheses.contains(&Hypothesis::Whitened) {
+            let (plain, whitened) = rayon::join(
+                || solve(&operators),
+                || -> Result<Eigenpairs, PipelineError> { Ok(solve(&assemble(&whiten(&mesh)?)?)?) },
+            );
+            (plain?, Some(whitened?))
+        } else {
+            (solve(&operators)?, None)
+        };
         observer(Stage::Signatures);
         Ok(Self {
             mesh,
             operators,
             eigenpairs,
+            whitened,
             report,
         })
     }
@@ -84,21 +94,17 @@ impl PreparedShape {
     }
 
     /// The views of a training shape: one per channel.
-    pub fn training_views(
-        &self,
-        parameters: &Parameters,
-        cancel: &Cancel,
-    ) -> Result<Vec<View>, PipelineError> {
+    pub fn training_views(&self, parameters: &Parameters) -> Result<Vec<View>, PipelineError> {
         let vertices = self.sample(parameters.samples_per_shape, parameters.seed);
-        parameters
-            .hypotheses
-            .iter()
-            .map(|hypothesis| match hypothesis {
-                Hypothesis::Plain => self.plain(&vertices, parameters),
-                Hypothesis::Whitened => self.whitened(&vertices, parameters, cancel),
-                Hypothesis::Doubled => self.fixed_grid(&vertices, parameters),
-            })
-            .collect()
+        let mut views = Vec::new();
+        for hypothesis in &parameters.hypotheses {
+            match hypothesis {
+                Hypothesis::Plain => views.push(self.plain(&vertices, parameters)?),
+                Hypothesis::Whitened => views.extend(self.whitened(&vertices, parameters)?),
+                Hypothesis::Doubled => views.push(self.fixed_grid(&vertices, parameters)?),
+            }
+        }
+        Ok(views)
     }
 
     /// The views of a query: one per hypothesis and assumed area.
@@ -108,7 +114,7 @@ impl PreparedShape {
         for hypothesis in &parameters.hypotheses {
             match hypothesis {
                 Hypothesis::Plain => views.push(self.plain(&vertices, parameters)?),
-                Hypothesis::Whitened => views.push(self.whitened(&vertices, parameters, cancel)?),
+                Hypothesis::Whitened => views.extend(self.whitened(&vertices, parameters)?),
                 Hypothesis::Doubled if self.report.openness > OPEN_ABOVE => {
                     views.extend(self.doubled(&vertices, parameters, cancel)?);
                 }
@@ -149,27 +155,20 @@ impl PreparedShape {
         )
     }
 
-    fn whitened(
-        &self,
-        vertices: &[u32],
-        parameters: &Parameters,
-        cancel: &Cancel,
-    ) -> Result<View, PipelineError> {
-        let operators = assemble(&whiten(&self.mesh)?)?;
-        let eigenpairs = smallest_eigenpairs(
-            &operators,
-            parameters.eigenpairs,
-            &EigenOptions::default(),
-            cancel,
-        )?;
-        view(
-            &eigenpairs,
-            vertices,
-            parameters,
-            Hypothesis::Whitened,
-            Channel::Whitened,
-            1.0,
-        )
+    fn whitened(&self, vertices: &[u32], parameters: &Parameters) -> Result<Option<View>, PipelineError> {
+        self.whitened
+            .as_ref()
+            .map(|eigenpairs| {
+                view(
+                    eigenpairs,
+                    vertices,
+                    parameters,
+                    Hypothesis::Whitened,
+                    Channel::Whitened,
+                    1.0,
+                )
+            })
+            .transpose()
     }
 
     /// One view per assumed area: the doubled surface has area 1, so a full area of s times the visible half's
@@ -184,6 +183,7 @@ impl PreparedShape {
         let options = EigenOptions::default();
         let doubled = doubled_eigenpairs(
             &self.operators,
+            &self.eigenpairs,
             &boundary,
             parameters.eigenpairs,
             &options,

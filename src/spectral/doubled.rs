@@ -11,7 +11,7 @@
 use super::eigen::eigenpairs_of;
 use super::normalised::Normalised;
 use super::shift_invert::Analysis;
-use super::{EigenOptions, Eigenpairs, Operators, SpectralError, smallest_eigenpairs};
+use super::{EigenOptions, Eigenpairs, Operators, SpectralError};
 use crate::cancel::Cancel;
 use faer::Mat;
 
@@ -63,10 +63,12 @@ fn interior_eigenpairs(
 
 /// The `n` smallest eigenpairs of the doubled surface of area 1, restricted to the original copy.
 ///
-/// `operators` are those of the open mesh (mass summing to 1), `boundary` (V entries) marks the vertices shared by the
-/// copies. Vectors are V × n. Errors as for [`smallest_eigenpairs`](super::smallest_eigenpairs).
+/// `operators` are those of the open mesh (mass summing to 1) and `even` its own eigenpairs, the even half of the
+/// answer: n of them, or all V − 1. `boundary` (V entries) marks the vertices shared by the copies. Vectors are V × n;
+/// fewer than n where `even` holds fewer. Errors as for [`smallest_eigenpairs`](super::smallest_eigenpairs).
 pub fn doubled_eigenpairs(
     operators: &Operators,
+    even: &Eigenpairs,
     boundary: &[bool],
     n: usize,
     options: &EigenOptions,
@@ -75,34 +77,39 @@ pub fn doubled_eigenpairs(
     let vertices = boundary.len();
     let interior = interior(boundary);
     let n = n.min((vertices + interior.len()).saturating_sub(1));
+    if interior.is_empty() {
+        return Ok(merge(even, &no_eigenpairs(vertices), n));
+    }
     let s = Normalised::new(operators, Some(&interior))?;
-    let analysis = if interior.is_empty() {
-        None
-    } else {
-        Some(Analysis::new(&s)?)
-    };
-    // Even functions outnumber odd ones by the boundary's share, a few in a hundred.
-    let mut even_count = (n * 6 / 10 + 6).min(n).min(vertices - 1);
-    let (even, odd_count) = loop {
-        let even = smallest_eigenpairs(operators, even_count, options, cancel)?;
-        // Odd eigenvalues up to the last even one: counted, not guessed.
-        let top = even.values.last().copied().unwrap_or(0.0);
-        let odd_count = match &analysis {
-            Some(analysis) => analysis.count_below(top * (1.0 + 1e-9))?,
-            None => 0,
-        };
-        let complete = even_count >= n.min(vertices - 1);
-        if complete || even_count + odd_count >= n {
-            let odd_count = if even_count == vertices - 1 { n } else { odd_count };
-            break (even, odd_count.min(n).min(interior.len()));
+    let analysis = Analysis::new(&s)?;
+    // Even functions outnumber odd ones by the boundary's share, a few in a hundred. Odd eigenvalues up to the last
+    // even one are counted, not guessed.
+    let known = even.values.len();
+    let mut even_count = (n * 6 / 10 + 6).min(known);
+    let odd_count = loop {
+        if even_count == known {
+            break n;
+        }
+        cancel.check()?;
+        let top = even.values[even_count - 1];
+        let odd_count = analysis.count_below(top * (1.0 + 1e-9))?;
+        if even_count + odd_count >= n {
+            break odd_count;
         }
         let ratio = n as f64 / (even_count + odd_count) as f64;
-        even_count = ((1.05 * ratio * even_count as f64) as usize + 4)
-            .min(n)
-            .min(vertices - 1);
+        even_count = ((1.05 * ratio * even_count as f64) as usize + 4).min(known);
     };
+    let odd_count = odd_count.min(n).min(interior.len());
     let odd = interior_eigenpairs(&s, &interior, vertices, odd_count, options, cancel)?;
-    Ok(merge(&even, &odd, n))
+    Ok(merge(even, &odd, n))
+}
+
+fn no_eigenpairs(vertices: usize) -> Eigenpairs {
+    Eigenpairs {
+        values: Vec::new(),
+        vectors: Mat::zeros(vertices, 0),
+        residual: 0.0,
+    }
 }
 
 /// The `n` smallest of both, eigenvalues doubled.
