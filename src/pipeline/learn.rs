@@ -24,6 +24,10 @@ pub struct Model {
 pub struct ModelReport {
     /// One report per channel.
     pub channels: BTreeMap<Channel, LearnReport>,
+    /// Scores of the class's shapes under dictionaries they were left out of
+    /// ([`held_out_scores`](super::held_out_scores)); empty where none were asked for.
+    #[serde(default)]
+    pub held_out: Vec<f64>,
 }
 
 /// Learns one dictionary per channel from all signatures of the given training shapes. `progress(done, total)` counts

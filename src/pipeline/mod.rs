@@ -4,6 +4,7 @@
 
 pub mod describe;
 pub mod error;
+pub mod held_out;
 pub mod learn;
 pub mod prepared;
 pub mod stage;
@@ -11,6 +12,7 @@ pub mod stage;
 pub use crate::ranking::rank;
 pub use describe::{Description, describe_both, describe_query, describe_shape};
 pub use error::PipelineError;
+pub use held_out::held_out_scores;
 pub use learn::{Model, ModelReport, learn_model};
 pub use prepared::PreparedShape;
 pub use stage::Stage;
