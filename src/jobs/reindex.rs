@@ -12,7 +12,7 @@ use crate::model::{
     Shape, SkippedClass,
 };
 use crate::parameters::Parameters;
-use crate::pipeline::{Description, PipelineError, learn_model};
+use crate::pipeline::{Description, PipelineError, held_out_scores, learn_model};
 use crate::store::{Store, StoreError};
 use arc_swap::ArcSwap;
 use jiff::Timestamp;
@@ -184,7 +184,11 @@ fn learn_class(
         return Ok(Learnt::Skipped(class, failed));
     }
     let all: Vec<&Description> = descriptions.iter().map(|(_, description)| description).collect();
-    let model = match learn_model(&all, parameters, request.cancel, &|_, _| {}) {
+    let learnt = learn_model(&all, parameters, request.cancel, &|_, _| {}).and_then(|mut model| {
+        model.report.held_out = held_out_scores(&all, parameters, request.cancel)?;
+        Ok(model)
+    });
+    let model = match learnt {
         Ok(model) => model,
         Err(PipelineError::Cancelled(_)) => return Err(ReindexError::Cancelled),
         Err(error) => {

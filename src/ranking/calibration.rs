@@ -25,6 +25,12 @@ struct Level {
     deviation: f64,
 }
 
+impl Level {
+    fn nonconformity(&self, log_score: f64) -> f64 {
+        (log_score - self.mean) / self.deviation
+    }
+}
+
 /// What scores shapes of the indexed classes usually have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
@@ -54,9 +60,6 @@ impl Calibration {
             })
             .filter(|(_, logs): &(_, Vec<f64>)| !logs.is_empty())
             .collect();
-        if classes.iter().map(|(_, logs)| logs.len()).sum::<usize>() < FEWEST {
-            return None;
-        }
         let mean = |logs: &[f64]| logs.iter().sum::<f64>() / logs.len() as f64;
         let spread = |logs: &[f64]| {
             let m = mean(logs);
@@ -64,26 +67,29 @@ impl Calibration {
         };
         let freedom: usize = classes.iter().map(|(_, logs)| logs.len() - 1).sum();
         let common = classes.iter().map(|(_, logs)| spread(logs)).sum::<f64>() / freedom.max(1) as f64;
+        let level = |logs: &[f64]| {
+            let variance = (spread(logs) + COMMON_DEVIATION_WEIGHT * common)
+                / (logs.len() as f64 - 1.0 + COMMON_DEVIATION_WEIGHT);
+            Level {
+                mean: mean(logs),
+                deviation: variance.sqrt().max(LEAST_DEVIATION),
+            }
+        };
         let levels: BTreeMap<String, Level> = classes
             .iter()
-            .map(|(label, logs)| {
-                let own = logs.len() as f64 - 1.0;
-                let variance =
-                    (spread(logs) + COMMON_DEVIATION_WEIGHT * common) / (own + COMMON_DEVIATION_WEIGHT);
-                let level = Level {
-                    mean: mean(logs),
-                    deviation: variance.sqrt().max(LEAST_DEVIATION),
-                };
-                ((*label).to_owned(), level)
-            })
+            .map(|(label, logs)| ((*label).to_owned(), level(logs)))
             .collect();
-        let mut nonconformities: Vec<f64> = classes
-            .iter()
-            .flat_map(|(label, logs)| {
-                let level = levels[*label];
-                logs.iter().map(move |x| (x - level.mean) / level.deviation)
-            })
-            .collect();
+        // Each is measured against the level of its class's others, as a query is against a level it had no part in.
+        let mut nonconformities = Vec::new();
+        for (_, logs) in classes.iter().filter(|(_, logs)| logs.len() > 1) {
+            for (i, x) in logs.iter().enumerate() {
+                let others = [&logs[..i], &logs[i + 1..]].concat();
+                nonconformities.push(level(&others).nonconformity(*x));
+            }
+        }
+        if nonconformities.len() < FEWEST {
+            return None;
+        }
         nonconformities.sort_unstable_by(f64::total_cmp);
         Some(Self {
             levels,
@@ -98,7 +104,7 @@ impl Calibration {
         if score <= 0.0 {
             return Some(1.0);
         }
-        let a = (score.ln() - level.mean) / level.deviation;
+        let a = level.nonconformity(score.ln());
         let below = self.nonconformities.partition_point(|x| *x < a);
         let n = self.nonconformities.len();
         Some((1 + n - below) as f64 / (n + 1) as f64)

@@ -1,0 +1,189 @@
+//! How well queries of no indexed class are told from the others, and whether the sets of possible classes hold what
+//! they promise.
+
+use super::evaluate::LabelledShape;
+use crate::cancel::Cancel;
+use crate::parameters::Parameters;
+use crate::pipeline::{Description, PipelineError, held_out_scores, learn_model};
+use crate::ranking::{Calibration, Index, IndexedClass, SIGNIFICANCE, rank};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Some of some.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Share {
+    /// How many.
+    pub count: usize,
+    /// Of how many.
+    pub total: usize,
+}
+
+impl Share {
+    /// count / total, 0 of none.
+    pub fn value(&self) -> f64 {
+        if self.total == 0 {
+            0.0
+        } else {
+            self.count as f64 / self.total as f64
+        }
+    }
+
+    fn add(&mut self, hit: bool) {
+        self.count += usize::from(hit);
+        self.total += 1;
+    }
+}
+
+/// What came of an open-set evaluation.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OpenSet {
+    /// Queries of indexed classes whose set of possible classes holds the true one; 95 % is promised.
+    pub covered: Share,
+    /// Queries of indexed classes answered "none of these".
+    pub refused_known: Share,
+    /// Queries answered "none of these" while their class, and those that count as the same, were left out of the index.
+    pub refused_unknown: Share,
+    /// The latter by class.
+    pub refused_by_class: BTreeMap<String, Share>,
+    /// Mean number of possible classes of a query of an indexed class.
+    pub mean_set_size: f64,
+    /// Classes left out because they have fewer than three shapes.
+    pub left_out: Vec<String>,
+}
+
+/// Half of every class trains, drawn by the seed, and the other half is queried. Then one class after the other is left
+/// out of the index and all its shapes are queried. Groups of `same` count as one class and are left out together.
+/// `None` where too few shapes train to calibrate anything.
+///
+/// # Errors
+/// The first error of learning or ranking.
+pub fn evaluate_open_set(
+    shapes: &[LabelledShape],
+    parameters: &Parameters,
+    same: &[Vec<String>],
+    seed: u64,
+    cancel: &Cancel,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Option<OpenSet>, PipelineError> {
+    let mut members: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    for (i, shape) in shapes.iter().enumerate() {
+        members.entry(&shape.class).or_default().push(i);
+    }
+    let left_out: Vec<String> = members
+        .iter()
+        .filter(|(_, list)| list.len() < 3)
+        .map(|(class, _)| (*class).to_owned())
+        .collect();
+    members.retain(|_, list| list.len() >= 3);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut train: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    for (class, list) in &members {
+        let mut dealt = list.clone();
+        dealt.shuffle(&mut rng);
+        dealt.truncate(list.len().div_ceil(2));
+        dealt.sort_unstable();
+        train.insert(class, dealt);
+    }
+    let queried: Vec<usize> = members.values().flatten().copied().collect();
+    let total = train.len() + queried.len();
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let tick = || progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, total);
+    let learnt: Vec<(IndexedClass, Vec<f64>)> = train
+        .par_iter()
+        .map(|(class, list)| {
+            let training: Vec<&Description> = list.iter().map(|&i| &shapes[i].training).collect();
+            let class = IndexedClass {
+                label: (*class).to_owned(),
+                dictionaries: learn_model(&training, parameters, cancel, &|_, _| ())?.dictionaries,
+                shapes: Vec::new(),
+            };
+            let held_out = held_out_scores(&training, parameters, cancel)?;
+            tick();
+            Ok((class, held_out))
+        })
+        .collect::<Result<_, PipelineError>>()?;
+    let held_out: BTreeMap<String, Vec<f64>> = learnt
+        .iter()
+        .map(|(class, scores)| (class.label.clone(), scores.clone()))
+        .collect();
+    let index = Index {
+        parameters: parameters.clone(),
+        classes: learnt.into_iter().map(|(class, _)| class).collect(),
+    };
+    let rankings: Vec<Vec<(String, f64)>> = queried
+        .par_iter()
+        .map(|&i| {
+            let ranking = rank(&shapes[i].query.views, &index, parameters.rank_by, cancel)?;
+            tick();
+            Ok(ranking.classes.into_iter().map(|c| (c.label, c.score)).collect())
+        })
+        .collect::<Result<_, PipelineError>>()?;
+    let group = |class: &str| -> BTreeSet<String> {
+        same.iter()
+            .filter(|g| g.iter().any(|c| c == class))
+            .flatten()
+            .cloned()
+            .chain([class.to_owned()])
+            .collect()
+    };
+    let calibration = |without: &BTreeSet<String>| {
+        Calibration::fit(
+            held_out
+                .iter()
+                .filter(|(class, _)| !without.contains(*class))
+                .map(|(class, scores)| (class.as_str(), scores.as_slice())),
+        )
+    };
+    let Some(full) = calibration(&BTreeSet::new()) else {
+        return Ok(None);
+    };
+    let mut result = OpenSet {
+        left_out,
+        ..OpenSet::default()
+    };
+    let mut possible = 0;
+    for (&i, ranked) in queried.iter().zip(&rankings) {
+        let class = shapes[i].class.as_str();
+        if train[class].contains(&i) {
+            continue;
+        }
+        let truth = group(class);
+        let verdict = full.judge(ranked.iter().map(|(label, score)| (label.as_str(), *score)));
+        let set: Vec<&str> = ranked
+            .iter()
+            .zip(&verdict.p_values)
+            .filter(|(_, p)| p.is_none_or(|p| p > SIGNIFICANCE))
+            .map(|((label, _), _)| label.as_str())
+            .collect();
+        possible += set.len();
+        result.covered.add(set.iter().any(|label| truth.contains(*label)));
+        result.refused_known.add(verdict.none_of_these);
+    }
+    result.mean_set_size = possible as f64 / result.covered.total.max(1) as f64;
+    for class in members.keys() {
+        let without = group(class);
+        let Some(calibration) = calibration(&without) else {
+            continue;
+        };
+        let mut share = Share::default();
+        let own = queried
+            .iter()
+            .zip(&rankings)
+            .filter(|(i, _)| shapes[**i].class == **class);
+        for (_, ranked) in own {
+            let others = ranked
+                .iter()
+                .filter(|(label, _)| !without.contains(label))
+                .map(|(label, score)| (label.as_str(), *score));
+            share.add(calibration.judge(others).none_of_these);
+        }
+        result.refused_unknown.count += share.count;
+        result.refused_unknown.total += share.total;
+        result.refused_by_class.insert((*class).to_owned(), share);
+    }
+    Ok(Some(result))
+}
