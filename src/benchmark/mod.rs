@@ -3,11 +3,21 @@
 pub mod deform;
 pub mod evaluate;
 pub mod measures;
+pub mod method;
+pub mod nearest;
 pub mod paper;
 pub mod protocol;
 pub mod report;
+pub mod retrieval;
+pub mod robustness;
+pub mod specimen;
+pub mod unit;
 
 pub use evaluate::{Evaluation, LabelledShape, QueryResult, evaluate};
 pub use measures::RetrievalMeasures;
+pub use method::Method;
 pub use protocol::{Protocol, Round, rounds};
 pub use report::BenchmarkReport;
+pub use robustness::{Category, Member, Robustness, robustness_rounds};
+pub use specimen::Specimen;
+pub use unit::{Outcome, Setting, Shapes, null_models, run_unit};
