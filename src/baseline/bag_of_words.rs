@@ -7,9 +7,9 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Rounds of Lloyd's algorithm at most.
-const ROUNDS: usize = 50;
+const ROUNDS: usize = 30;
 /// Signatures used at most to find the words.
-const SIGNATURES: usize = 6000;
+const SIGNATURES: usize = 4000;
 
 /// k words, the centres of k-means clusters.
 #[derive(Clone, Debug)]
@@ -23,6 +23,7 @@ impl Vocabulary {
     pub fn learn(training: &[&Signatures], k: usize, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let signals = subset(training, &mut rng);
+        let norms = squared_norms(&signals);
         let n = signals.ncols();
         let mut words = Mat::zeros(signals.nrows(), k.min(n));
         let mut nearest = vec![f64::INFINITY; n];
@@ -30,7 +31,10 @@ impl Vocabulary {
         for w in 0..words.ncols() {
             words.col_mut(w).copy_from(signals.col(next));
             let chosen = Mat::from_fn(signals.nrows(), 1, |i, _| signals[(i, next)]);
-            for (best, d) in nearest.iter_mut().zip(squared_distances(&chosen, &signals)) {
+            for (best, d) in nearest
+                .iter_mut()
+                .zip(squared_distances(&chosen, &signals, &norms))
+            {
                 *best = best.min(d);
             }
             let total: f64 = nearest.iter().sum();
@@ -46,7 +50,7 @@ impl Vocabulary {
         let mut vocabulary = Self { words };
         let mut assigned = vec![usize::MAX; n];
         for _ in 0..ROUNDS {
-            let now = vocabulary.assign(&signals);
+            let now = vocabulary.assign(&signals, &norms);
             if now == assigned {
                 break;
             }
@@ -59,16 +63,16 @@ impl Vocabulary {
     /// How often each word is the nearest: k shares that sum to 1.
     pub fn describe(&self, signatures: &Signatures) -> Vec<f64> {
         let mut histogram = vec![0.0; self.words.ncols()];
-        for word in self.assign(&signatures.matrix) {
+        for word in self.assign(&signatures.matrix, &squared_norms(&signatures.matrix)) {
             histogram[word] += 1.0 / signatures.len() as f64;
         }
         histogram
     }
 
-    /// The nearest word of every column.
-    fn assign(&self, signals: &Mat<f64>) -> Vec<usize> {
+    /// The nearest word of every column; `norms` are the columns' squared norms.
+    fn assign(&self, signals: &Mat<f64>, norms: &[f64]) -> Vec<usize> {
         let k = self.words.ncols();
-        let distances = squared_distances(&self.words, signals);
+        let distances = squared_distances(&self.words, signals, norms);
         distances
             .chunks_exact(k.max(1))
             .map(|row| {
@@ -97,14 +101,19 @@ impl Vocabulary {
     }
 }
 
-/// ‖w − s‖² of every word (M × k) and signal (M × N): N rows of k, one after the other.
-fn squared_distances(words: &Mat<f64>, signals: &Mat<f64>) -> Vec<f64> {
+/// ‖s‖² of every column.
+fn squared_norms(signals: &Mat<f64>) -> Vec<f64> {
+    (0..signals.ncols())
+        .map(|j| signals.col(j).squared_norm_l2())
+        .collect()
+}
+
+/// ‖w − s‖² of every word (M × k) and signal (M × N, of squared norms `norms`): N rows of k, one after the other.
+fn squared_distances(words: &Mat<f64>, signals: &Mat<f64>, norms: &[f64]) -> Vec<f64> {
     let products = words.transpose() * signals;
-    let norm = |m: &Mat<f64>, j: usize| m.col(j).squared_norm_l2();
-    let word_norms: Vec<f64> = (0..words.ncols()).map(|j| norm(words, j)).collect();
+    let word_norms = squared_norms(words);
     let mut distances = Vec::with_capacity(words.ncols() * signals.ncols());
-    for j in 0..signals.ncols() {
-        let own = norm(signals, j);
+    for (j, own) in norms.iter().enumerate() {
         distances.extend(
             word_norms
                 .iter()

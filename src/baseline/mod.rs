@@ -7,7 +7,7 @@ pub mod signature_distances;
 
 pub use bag_of_words::Vocabulary;
 pub use shape_dna::shape_dna;
-pub use signature_distances::SignatureDistances;
+pub use signature_distances::{SignatureDistances, sample_distances};
 
 /// ‖a − b‖₂ of two vectors of equal length.
 pub fn distance(a: &[f64], b: &[f64]) -> f64 {

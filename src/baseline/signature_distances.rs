@@ -1,7 +1,6 @@
 //! Signature Distance Distribution (the paper's SDD, section 4): a histogram of the distances between the signatures
 //! of random pairs of vertices.
 
-use super::distance;
 use crate::signature::Signatures;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -24,10 +23,20 @@ pub struct SignatureDistances {
 impl SignatureDistances {
     /// Chooses the range by training shapes.
     pub fn fit(training: &[&Signatures], seed: u64) -> Self {
-        let mut all: Vec<f64> = training.iter().flat_map(|s| distances(s, seed)).collect();
-        all.sort_unstable_by(f64::total_cmp);
+        let all: Vec<Vec<f64>> = training.iter().map(|s| sample_distances(s, seed)).collect();
+        let slices: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();
+        Self::fit_distances(&slices)
+    }
+
+    /// As [`SignatureDistances::fit`], from distances that [`sample_distances`] gave.
+    pub fn fit_distances(training: &[&[f64]]) -> Self {
+        let mut all = training.concat();
         let at = ((all.len() as f64 * COVERED) as usize).min(all.len().saturating_sub(1));
-        let largest = all.get(at).copied().unwrap_or(1.0);
+        let largest = if all.is_empty() {
+            1.0
+        } else {
+            *all.select_nth_unstable_by(at, f64::total_cmp).1
+        };
         Self {
             largest: if largest > 0.0 { largest } else { 1.0 },
         }
@@ -35,29 +44,35 @@ impl SignatureDistances {
 
     /// The histogram of one shape: 100 shares that sum to 1.
     pub fn describe(&self, signatures: &Signatures, seed: u64) -> Vec<f64> {
+        self.histogram(&sample_distances(signatures, seed))
+    }
+
+    /// As [`SignatureDistances::describe`], from distances that [`sample_distances`] gave.
+    pub fn histogram(&self, distances: &[f64]) -> Vec<f64> {
         let mut histogram = vec![0.0; BINS];
-        let all = distances(signatures, seed);
-        for d in &all {
+        for d in distances {
             let bin = (d / self.largest * BINS as f64) as usize;
-            histogram[bin.min(BINS - 1)] += 1.0 / all.len() as f64;
+            histogram[bin.min(BINS - 1)] += 1.0 / distances.len() as f64;
         }
         histogram
     }
 }
 
-/// Distances of random pairs of different vertices.
-fn distances(signatures: &Signatures, seed: u64) -> Vec<f64> {
+/// Euclidean distances between the signatures of 10⁴ random pairs of different vertices, the same pairs for the same
+/// number of vertices and seed.
+pub fn sample_distances(signatures: &Signatures, seed: u64) -> Vec<f64> {
     let n = signatures.len();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     if n < 2 {
         return vec![0.0];
     }
-    let column = |j: usize| -> Vec<f64> { signatures.matrix.col(j).iter().copied().collect() };
+    let matrix = &signatures.matrix;
     (0..REPETITIONS * PAIRS)
         .map(|_| {
             let a = rng.random_range(0..n);
             let b = (a + rng.random_range(1..n)) % n;
-            distance(&column(a), &column(b))
+            let squares = matrix.col(a).iter().zip(matrix.col(b).iter());
+            squares.map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
         })
         .collect()
 }
@@ -65,6 +80,7 @@ fn distances(signatures: &Signatures, seed: u64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::baseline::distance;
     use faer::Mat;
 
     #[test]

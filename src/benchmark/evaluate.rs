@@ -86,18 +86,51 @@ pub fn evaluate(
     let classes: Vec<&str> = shapes.iter().map(|s| s.class.as_str()).collect();
     let names: Vec<&str> = shapes.iter().map(|s| s.name.as_str()).collect();
     let rounds = rounds(protocol, &classes, &names);
-    let mut uses: HashMap<(&str, &[usize]), usize> = HashMap::new();
-    for round in &rounds {
-        for (class, members) in &round.train {
-            *uses.entry((class, members)).or_default() += 1;
+    let queries = run_rounds(
+        shapes,
+        &rounds,
+        parameters,
+        same,
+        &Models::new(),
+        cancel,
+        progress,
+    )?;
+    let single = match protocol {
+        Protocol::LeaveOneOut | Protocol::KFold { .. } => {
+            shapes.len() - rounds.iter().map(|r| r.query.len()).sum::<usize>()
         }
+        Protocol::EvenOdd | Protocol::OneShot { .. } => 0,
+    };
+    Ok(sum_up(protocol, queries, single))
+}
+
+/// Models by the shapes they were learnt from.
+pub type Models = HashMap<Vec<usize>, Arc<Model>>;
+
+/// Learns what the rounds need, beyond what is `given`, and answers their queries. `progress(done, total)` counts
+/// dictionaries and queries.
+///
+/// # Errors
+/// The first error of learning or ranking.
+pub fn run_rounds(
+    shapes: &[LabelledShape],
+    rounds: &[Round],
+    parameters: &Parameters,
+    same: &[Vec<String>],
+    given: &Models,
+    cancel: &Cancel,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<QueryResult>, PipelineError> {
+    let mut uses: HashMap<&[usize], usize> = HashMap::new();
+    for members in rounds.iter().flat_map(|r| r.train.values()) {
+        *uses.entry(members).or_default() += 1;
     }
     // A dictionary that several rounds use is learnt once and kept; one that a single round uses lives only in it,
     // which bounds the memory of leave-one-out to a dictionary per class and thread.
-    let mut shared: Vec<_> = uses
+    let mut shared: Vec<&[usize]> = uses
         .iter()
-        .filter(|&(_, &n)| n > 1)
-        .map(|(&key, _)| key)
+        .filter(|&(members, &n)| n > 1 && !given.contains_key(*members))
+        .map(|(&members, _)| members)
         .collect();
     shared.sort_unstable();
     let total = shared.len() + rounds.iter().map(|r| r.query.len()).sum::<usize>();
@@ -107,27 +140,27 @@ pub fn evaluate(
         let training: Vec<&Description> = members.iter().map(|&i| &shapes[i].training).collect();
         learn_model(&training, parameters, cancel, &|_, _| ()).map(Arc::new)
     };
-    let kept: HashMap<(&str, &[usize]), Arc<Model>> = shared
+    let kept: HashMap<&[usize], Arc<Model>> = shared
         .par_iter()
-        .map(|&key| {
-            let model = learn(key.1)?;
+        .map(|&members| {
+            let model = learn(members)?;
             tick();
-            Ok((key, model))
+            Ok((members, model))
         })
         .collect::<Result<_, PipelineError>>()?;
     let answer = |round: &Round| -> Result<Vec<QueryResult>, PipelineError> {
         let classes = round
             .train
-            .iter()
+            .par_iter()
             .map(|(class, members)| {
-                let model = match kept.get(&(class.as_str(), members.as_slice())) {
+                let known = given.get(members).or_else(|| kept.get(members.as_slice()));
+                let model = match known {
                     Some(model) => model.clone(),
                     None => learn(members)?,
                 };
-                let dictionaries = model.dictionaries.clone();
                 Ok(IndexedClass {
                     label: class.clone(),
-                    dictionaries,
+                    dictionaries: model.dictionaries.clone(),
                     shapes: Vec::new(),
                 })
             })
@@ -143,33 +176,26 @@ pub fn evaluate(
                 let ranking = rank(&shapes[i].query.views, &index, parameters.rank_by, cancel)?;
                 let ranked = ranking.classes.into_iter().map(|c| (c.label, c.score)).collect();
                 tick();
-                Ok(judge(&shapes[i], ranked, same))
+                Ok(judge(&shapes[i].class, &shapes[i].name, ranked, same))
             })
             .collect()
     };
-    let queries = rounds
+    let answers = rounds
         .par_iter()
         .map(answer)
-        .collect::<Result<Vec<_>, _>>()?
-        .into_iter()
-        .flatten()
-        .collect();
-    let single = match protocol {
-        Protocol::LeaveOneOut | Protocol::KFold { .. } => {
-            shapes.len() - rounds.iter().map(|r| r.query.len()).sum::<usize>()
-        }
-        Protocol::EvenOdd | Protocol::OneShot { .. } => 0,
-    };
-    Ok(sum_up(protocol, queries, single))
+        .collect::<Result<Vec<_>, PipelineError>>()?;
+    Ok(answers.into_iter().flatten().collect())
 }
 
-fn judge(shape: &LabelledShape, ranked: Vec<(String, f64)>, same: &[Vec<String>]) -> QueryResult {
-    let is_true = |label: &str| {
-        label == shape.class
-            || same
-                .iter()
-                .any(|g| g.iter().any(|c| c == label) && g.contains(&shape.class))
-    };
+/// Whether an answer of class `answered` to a query of class `class` counts as right.
+pub fn counts_as(class: &str, answered: &str, same: &[Vec<String>]) -> bool {
+    let within = |group: &Vec<String>, name: &str| group.iter().any(|c| c == name);
+    class == answered || same.iter().any(|g| within(g, class) && within(g, answered))
+}
+
+/// Compares a ranking of classes, best first, with the truth.
+pub fn judge(class: &str, name: &str, ranked: Vec<(String, f64)>, same: &[Vec<String>]) -> QueryResult {
+    let is_true = |label: &str| counts_as(class, label, same);
     let true_rank = ranked
         .iter()
         .position(|(label, _)| is_true(label))
@@ -185,8 +211,8 @@ fn judge(shape: &LabelledShape, ranked: Vec<(String, f64)>, same: &[Vec<String>]
         _ => 0.0,
     };
     QueryResult {
-        class: shape.class.clone(),
-        name: shape.name.clone(),
+        class: class.to_owned(),
+        name: name.to_owned(),
         correct: true_rank == 1,
         ranked,
         true_rank,

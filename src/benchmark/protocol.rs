@@ -118,7 +118,7 @@ pub fn rounds(protocol: Protocol, classes: &[&str], names: &[&str]) -> Vec<Round
 }
 
 /// A name cut into text and numbers, so that `cat10` comes after `cat2`.
-fn natural_key(name: &str) -> Vec<(String, u64)> {
+pub fn natural_key(name: &str) -> Vec<(String, u64)> {
     let mut key = Vec::new();
     let mut rest = name;
     while !rest.is_empty() {

@@ -4,6 +4,8 @@ use super::files::{LabelledFile, MeshFile, labelled_files};
 use super::progress::Progress;
 use super::refused::Refused;
 use super::{CliError, ParameterArgs, evaluation_report, output};
+use crate::benchmark::evaluate::Models;
+use crate::benchmark::retrieval::{RetrievalOutcome, coding_scores, judge_retrieval};
 use crate::benchmark::{Evaluation, LabelledShape, Protocol, evaluate};
 use crate::cancel::Cancel;
 use crate::mesh::{Limits, MeshError, TriangleSoup, read, read_poses};
@@ -26,6 +28,8 @@ pub enum ProtocolName {
     OneShot,
     /// Every class is dealt into folds, each is queried once
     KFold,
+    /// Shape against shape: every shape asks for the others of its class
+    Retrieval,
 }
 
 /// Arguments of `evaluate`.
@@ -36,7 +40,8 @@ pub struct EvaluateArgs {
     pub dir: PathBuf,
     /// How shapes are split into training shapes and queries; may be repeated
     #[arg(long, value_enum, value_name = "PROTOCOL",
-          default_values_t = [ProtocolName::LeaveOneOut, ProtocolName::EvenOdd, ProtocolName::OneShot])]
+          default_values_t = [ProtocolName::LeaveOneOut, ProtocolName::EvenOdd, ProtocolName::OneShot,
+                              ProtocolName::Retrieval])]
     pub protocol: Vec<ProtocolName>,
     /// Classes that count as one another's right answer, such as --same michael,david; may be repeated
     #[arg(long, value_name = "CLASS,CLASS…")]
@@ -79,6 +84,8 @@ pub struct Report {
     pub parameters: Parameters,
     /// One outcome per protocol.
     pub protocols: Vec<Outcome>,
+    /// Shape against shape, where it was asked for: a dictionary per shape, nearest neighbour, tiers, DCG, mAP.
+    pub retrieval: Option<RetrievalOutcome>,
     /// Wall-clock time of the whole, in seconds.
     pub seconds: f64,
 }
@@ -131,8 +138,12 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
         )));
     }
     let mut protocols = Vec::new();
+    let mut retrieval = None;
     for &name in &args.protocol {
-        let protocol = protocol(name, args);
+        let Some(protocol) = protocol(name, args) else {
+            retrieval = Some(retrieve(&shapes, &parameters, &same)?);
+            continue;
+        };
         let progress = Progress::new(protocol.name(), 0);
         let mut evaluation = evaluate(
             &shapes,
@@ -157,6 +168,7 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
         left_out,
         parameters,
         protocols,
+        retrieval,
         seconds: began.elapsed().as_secs_f64(),
     };
     if json {
@@ -171,20 +183,41 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
     }
 }
 
-fn protocol(name: ProtocolName, args: &EvaluateArgs) -> Protocol {
+/// The split of a protocol; none for shape against shape, which has no classes to train.
+fn protocol(name: ProtocolName, args: &EvaluateArgs) -> Option<Protocol> {
     let seed = args.split_seed;
     match name {
-        ProtocolName::LeaveOneOut => Protocol::LeaveOneOut,
-        ProtocolName::EvenOdd => Protocol::EvenOdd,
-        ProtocolName::OneShot => Protocol::OneShot {
+        ProtocolName::LeaveOneOut => Some(Protocol::LeaveOneOut),
+        ProtocolName::EvenOdd => Some(Protocol::EvenOdd),
+        ProtocolName::OneShot => Some(Protocol::OneShot {
             draws: args.draws,
             seed,
-        },
-        ProtocolName::KFold => Protocol::KFold {
+        }),
+        ProtocolName::KFold => Some(Protocol::KFold {
             folds: args.folds,
             seed,
-        },
+        }),
+        ProtocolName::Retrieval => None,
     }
+}
+
+/// Shape against shape: a dictionary of every shape, every shape queried against all others.
+fn retrieve(
+    shapes: &[LabelledShape],
+    parameters: &Parameters,
+    same: &[Vec<String>],
+) -> Result<RetrievalOutcome, CliError> {
+    let progress = Progress::new("retrieval", 0);
+    let scores = coding_scores(
+        shapes,
+        parameters,
+        &Models::new(),
+        &Cancel::new(),
+        &|done, total| progress.set(done, total),
+    )?;
+    progress.finish();
+    let classes: Vec<&str> = shapes.iter().map(|s| s.class.as_str()).collect();
+    Ok(judge_retrieval(&scores, &classes, same))
 }
 
 /// Describes every file on all cores. Files that cannot be used come back with their reason.

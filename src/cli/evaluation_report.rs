@@ -2,6 +2,7 @@
 
 use super::evaluate::{Outcome, Report};
 use super::output::table;
+use crate::benchmark::retrieval::RetrievalOutcome;
 
 /// Confusion matrices with more classes than this do not fit a screen; they are listed instead.
 const MATRIX_CLASSES: usize = 26;
@@ -24,8 +25,35 @@ pub fn text(report: &Report) -> String {
         parts.push(format!("refused: {}: {}", refused.file, refused.reason));
     }
     parts.extend(report.protocols.iter().map(outcome));
-    parts.push(summary(report));
+    if !report.protocols.is_empty() {
+        parts.push(summary(report));
+    }
+    parts.extend(report.retrieval.as_ref().map(retrieval));
     parts.join("\n")
+}
+
+fn retrieval(outcome: &RetrievalOutcome) -> String {
+    let m = &outcome.measures;
+    let values = [
+        m.nearest_neighbour,
+        m.first_tier,
+        m.second_tier,
+        m.e_measure,
+        m.dcg,
+        m.average_precision,
+    ];
+    let mut row = vec![outcome.total.to_string()];
+    row.extend(values.map(|v| format!("{v:.3}")));
+    let header = [
+        ">queries",
+        ">nearest neighbour",
+        ">first tier",
+        ">second tier",
+        ">E-measure",
+        ">DCG",
+        ">mAP",
+    ];
+    format!("\nretrieval, shape against shape\n{}", table(&header, &[row]))
 }
 
 fn summary(report: &Report) -> String {

@@ -5,6 +5,11 @@
 //! wrong.
 
 mod api;
+pub mod benchmark;
+pub mod benchmark_args;
+mod benchmark_cache;
+mod benchmark_nulls;
+mod benchmark_report;
 mod client;
 pub mod demo;
 mod demo_report;
@@ -22,6 +27,7 @@ pub mod keys;
 mod openapi;
 mod output;
 mod parameters;
+mod peak_memory;
 mod progress;
 pub mod query;
 mod refused;
@@ -67,6 +73,8 @@ pub enum Command {
     Query(query::QueryArgs),
     /// Measure accuracy on a folder per class
     Evaluate(evaluate::EvaluateArgs),
+    /// Measure robustness: deform null shapes, compare methods and baselines
+    Benchmark(benchmark_args::BenchmarkArgs),
     /// Show what is read of a file, what cleaning did, how its spectrum begins
     Inspect(inspect::InspectArgs),
     /// Write procedural creatures, a folder per class
@@ -119,6 +127,7 @@ fn dispatch(cli: &Cli) -> Result<(), CliError> {
         Command::Index(args) => index::run(args, json),
         Command::Query(args) => query::run(args, json),
         Command::Evaluate(args) => evaluate::run(args, json),
+        Command::Benchmark(args) => benchmark::run(args, json),
         Command::Inspect(args) => inspect::run(args, json),
         Command::Zoo(args) => zoo::run(args, json),
         Command::Export(args) => export::run(args, json),

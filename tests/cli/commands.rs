@@ -21,6 +21,10 @@ fn help_and_version_succeed_and_wrong_usage_is_2() {
         &["query", "x.obj", "--server", "ftp://elsewhere"],
         &["query", "x.obj", "--server", "http://x", "--data", "y"],
         &["evaluate", "."],
+        &["benchmark", "--classes", "1"],
+        &["benchmark", "--methods", "best"],
+        &["benchmark", "--protocols", "easy"],
+        &["benchmark", "."],
         &["zoo", "--out", "z", "--classes", "0"],
         &["demo", "--classes", "1"],
         &["serve", "--listen", "here"],
@@ -168,6 +172,20 @@ fn evaluate_tells_the_classes_of_a_small_zoo_apart_and_names_refused_files() {
         .map(|p| p["name"].as_str().unwrap())
         .collect();
     assert_eq!(names, ["leave-one-out", "even/odd", "one-shot"]);
+    let retrieval = &report["retrieval"];
+    assert_eq!(retrieval["total"], 12);
+    for measure in [
+        "nearest_neighbour",
+        "first_tier",
+        "second_tier",
+        "dcg",
+        "average_precision",
+    ] {
+        assert!(
+            retrieval["measures"][measure].as_f64().unwrap() > 0.6,
+            "{measure}: {retrieval}"
+        );
+    }
     assert_eq!(report["protocols"][0]["total"], 12);
     assert_eq!(report["protocols"][1]["total"], 6);
     for protocol in report["protocols"].as_array().unwrap() {

@@ -1,5 +1,6 @@
 //! The built binary, as a shell sees it.
 
+mod benchmark;
 mod commands;
 mod configuration;
 mod readme;

@@ -9,18 +9,38 @@ use rand_chacha::ChaCha8Rng;
 /// Discs cut out at every strength.
 const BIG_HOLES: usize = 4;
 /// Radius of a disc per strength, in √area.
-const BIG_RADIUS: f64 = 0.035;
+const BIG_RADIUS: f64 = 0.022;
 /// Share of the vertices cut out per strength.
-const MICRO_SHARE: f64 = 0.012;
+const MICRO_SHARE: f64 = 0.006;
+
+/// Discs cut out of a shape that is also turned, moved and scaled.
+const SIMILARITY_HOLES: usize = 6;
+/// Radius of such a disc per strength, in √area.
+const SIMILARITY_RADIUS: f64 = 0.045;
 
 /// Cuts out discs around centres drawn by area; the radius grows with the strength.
 pub fn big(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> TriangleSoup {
+    discs(null, BIG_HOLES, BIG_RADIUS * f64::from(strength), rng)
+}
+
+/// As [`big`], with more and larger discs.
+pub fn similarity_holes(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> TriangleSoup {
+    discs(
+        null,
+        SIMILARITY_HOLES,
+        SIMILARITY_RADIUS * f64::from(strength),
+        rng,
+    )
+}
+
+/// Cuts out `count` discs with a radius in √area, measured along the edges.
+fn discs(null: &TriangleSoup, count: usize, radius: f64, rng: &mut ChaCha8Rng) -> TriangleSoup {
     let edges = neighbours(null);
     let areas = vertex_areas(null);
     let total: f64 = areas.iter().sum();
-    let radius = BIG_RADIUS * f64::from(strength) * length_unit(null);
+    let radius = radius * length_unit(null);
     let mut removed = vec![false; null.vertices.len()];
-    for _ in 0..BIG_HOLES {
+    for _ in 0..count {
         let mut threshold = rng.random::<f64>() * total;
         let centre = areas
             .iter()

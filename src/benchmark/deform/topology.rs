@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 /// Pairs are welded that are at least this far apart along the surface, in √area …
 const FAR: f64 = 0.4;
 /// … and as near in space as any such pair, up to this many welds per strength.
-const WELDS: usize = 3;
+const WELDS: usize = 2;
 /// Vertices tried as one end of a pair.
 const TRIED: usize = 400;
 

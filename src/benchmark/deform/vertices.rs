@@ -7,15 +7,15 @@ use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
 
 /// Largest logarithmic stretch per strength.
-const AFFINE_STRETCH: f64 = 0.16;
+const AFFINE_STRETCH: f64 = 0.135;
 /// Scale factors of strengths 1 to 5 (the paper's).
 const SCALES: [f64; 5] = [0.5, 0.875, 1.25, 1.625, 2.0];
 /// Standard deviation of the noise per strength, in mean edge lengths.
-const NOISE: f64 = 0.06;
+const NOISE: f64 = 0.04;
 /// Share of the vertices that shot noise throws, per strength.
-const SHOT_SHARE: f64 = 0.006;
+const SHOT_SHARE: f64 = 0.004;
 /// How far it throws them, in √area.
-const SHOT_DISTANCE: f64 = 0.12;
+const SHOT_DISTANCE: f64 = 0.09;
 
 /// v ← R diag(e^a, e^b, e^−a−b) Rᵀ v, a and b as large as the strength allows and of random order and sign: volume
 /// stays, angles and areas do not.

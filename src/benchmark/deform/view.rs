@@ -13,27 +13,7 @@ const DEPTH_SLACK: f64 = 1.5;
 ///
 /// A picture of depths is drawn; a face is kept if its centroid or a corner-near point of it lies at the front.
 pub fn visible(null: &TriangleSoup, _strength: u32, rng: &mut ChaCha8Rng) -> TriangleSoup {
-    let camera = rotation(rng);
-    let seen: Vec<[f64; 3]> = null.vertices.iter().map(|p| map(&camera, p)).collect();
-    let bound = |k: usize, pick: fn(f64, f64) -> f64, start: f64| seen.iter().map(|p| p[k]).fold(start, pick);
-    let low = [
-        bound(0, f64::min, f64::INFINITY),
-        bound(1, f64::min, f64::INFINITY),
-    ];
-    let high = [
-        bound(0, f64::max, f64::NEG_INFINITY),
-        bound(1, f64::max, f64::NEG_INFINITY),
-    ];
-    let pixel = ((high[0] - low[0]).max(high[1] - low[1]) / PIXELS as f64).max(f64::MIN_POSITIVE);
-    let points: Vec<[f64; 3]> = seen
-        .iter()
-        .map(|p| [(p[0] - low[0]) / pixel, (p[1] - low[1]) / pixel, p[2] / pixel])
-        .collect();
-    let width = PIXELS + 1;
-    let mut depth = vec![f64::NEG_INFINITY; width * width];
-    for f in &null.faces {
-        draw(&f.map(|v| points[v as usize]), width, &mut depth);
-    }
+    let Picture { points, width, depth } = Picture::take(null, rng);
     let front = |p: [f64; 3]| {
         let (x, y) = ((p[0] + 0.5) as usize, (p[1] + 0.5) as usize);
         let nearest = depth[y.min(width - 1) * width + x.min(width - 1)];
@@ -54,6 +34,45 @@ pub fn visible(null: &TriangleSoup, _strength: u32, rng: &mut ChaCha8Rng) -> Tri
     TriangleSoup {
         vertices: null.vertices.clone(),
         faces,
+    }
+}
+
+/// A picture of depths from a random viewpoint at infinity.
+pub struct Picture {
+    /// The vertices, turned to the camera: pixels to the right, pixels up, and nearness in pixels.
+    pub points: Vec<[f64; 3]>,
+    /// Pixels in a row.
+    pub width: usize,
+    /// Nearness of the surface, row by row; −∞ where there is none.
+    pub depth: Vec<f64>,
+}
+
+impl Picture {
+    /// Draws all faces.
+    pub fn take(null: &TriangleSoup, rng: &mut ChaCha8Rng) -> Self {
+        let camera = rotation(rng);
+        let seen: Vec<[f64; 3]> = null.vertices.iter().map(|p| map(&camera, p)).collect();
+        let bound =
+            |k: usize, pick: fn(f64, f64) -> f64, start: f64| seen.iter().map(|p| p[k]).fold(start, pick);
+        let low = [
+            bound(0, f64::min, f64::INFINITY),
+            bound(1, f64::min, f64::INFINITY),
+        ];
+        let high = [
+            bound(0, f64::max, f64::NEG_INFINITY),
+            bound(1, f64::max, f64::NEG_INFINITY),
+        ];
+        let pixel = ((high[0] - low[0]).max(high[1] - low[1]) / PIXELS as f64).max(f64::MIN_POSITIVE);
+        let points: Vec<[f64; 3]> = seen
+            .iter()
+            .map(|p| [(p[0] - low[0]) / pixel, (p[1] - low[1]) / pixel, p[2] / pixel])
+            .collect();
+        let width = PIXELS + 1;
+        let mut depth = vec![f64::NEG_INFINITY; width * width];
+        for f in &null.faces {
+            draw(&f.map(|v| points[v as usize]), width, &mut depth);
+        }
+        Self { points, width, depth }
     }
 }
 
