@@ -6,6 +6,7 @@
 
 use crate::http::ServiceConfig;
 use crate::mesh::Limits;
+use crate::model::KeyLimits;
 use crate::parameters::Preset;
 use crate::store::StoreOptions;
 use crate::telemetry::LogFormat;
@@ -101,6 +102,26 @@ settings! {
     listen: SocketAddr = DEFAULT_LISTEN, "SHAPELEX_LISTEN", "ADDRESS";
     /// Answer requests without an API key beyond loopback too, as long as no key exists
     allow_anonymous: bool = false, "SHAPELEX_ALLOW_ANONYMOUS", "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true";
+    /// Certificate chain (PEM) for HTTPS by the service itself, with --tls-key; none for HTTP
+    tls_cert: PathBuf = PathBuf::new(), "SHAPELEX_TLS_CERT", "FILE";
+    /// Private key (PEM) of the certificate
+    tls_key: PathBuf = PathBuf::new(), "SHAPELEX_TLS_KEY", "FILE";
+    /// Origins whose pages may call the API from a browser, such as https://viewer.example, or * for all
+    cors_origin: Vec<String> = Vec::new(), "SHAPELEX_CORS_ORIGIN", "ORIGIN", value_delimiter = ',', action = clap::ArgAction::Append;
+    /// Connections served at a time; more wait
+    max_connections: usize = 1024, "SHAPELEX_MAX_CONNECTIONS", "COUNT";
+    /// Time the head of a request may take to arrive, and a connection may idle, in seconds
+    header_timeout_seconds: u64 = 20, "SHAPELEX_HEADER_TIMEOUT_SECONDS", "SECONDS";
+    /// Longest head of a request, in KiB
+    max_header_kib: usize = 32, "SHAPELEX_MAX_HEADER_KIB", "KIB";
+    /// Meshes an API key may query per minute, where it does not say itself; 0 for no limit
+    key_queries_per_minute: u32 = 0, "SHAPELEX_KEY_QUERIES_PER_MINUTE", "COUNT";
+    /// Size of the shapes an API key may have uploaded at a time, in MiB, where it does not say itself; 0 for no limit
+    key_max_stored_mib: u64 = 0, "SHAPELEX_KEY_MAX_STORED_MIB", "MIB";
+    /// Classes an API key may have made at a time, where it does not say itself; 0 for no limit
+    key_max_classes: u64 = 0, "SHAPELEX_KEY_MAX_CLASSES", "COUNT";
+    /// Log queries that take this long or longer, in milliseconds; 0 for none
+    slow_query_ms: u64 = 0, "SHAPELEX_SLOW_QUERY_MS", "MILLISECONDS";
     /// Log level (error, warn, info, debug, trace, off), or a list of target=level
     log: String = "info".to_owned(), "SHAPELEX_LOG", "FILTER";
     /// How log lines are written
@@ -165,6 +186,19 @@ pub fn parse_preset(text: &str) -> Result<Preset, String> {
         .map_err(|_| "expected default, paper or robust".to_owned())
 }
 
+fn given(path: &Path) -> Option<PathBuf> {
+    (!path.as_os_str().is_empty()).then(|| path.to_owned())
+}
+
+/// `*`, or what a browser sends as `origin`: scheme, host and perhaps a port.
+fn is_origin(text: &str) -> bool {
+    let host = text
+        .strip_prefix("https://")
+        .or_else(|| text.strip_prefix("http://"));
+    let inside = |c: char| c.is_ascii_alphanumeric() || "-._:[]".contains(c);
+    text == "*" || host.is_some_and(|host| !host.is_empty() && host.chars().all(inside))
+}
+
 /// The parser's message with the line it is about, on one line.
 fn one_line(error: &toml::de::Error, text: &str) -> String {
     let message = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
@@ -179,7 +213,7 @@ fn one_line(error: &toml::de::Error, text: &str) -> String {
 
 impl Config {
     fn validate(&self) -> Result<(), ConfigError> {
-        let at_least_one: [(&'static str, u64); 12] = [
+        let at_least_one: [(&'static str, u64); 14] = [
             ("max_body_mib", self.max_body_mib as u64),
             ("max_upload_files", self.max_upload_files as u64),
             ("max_unpacked_mib", self.max_unpacked_mib as u64),
@@ -192,7 +226,23 @@ impl Config {
             ("upload_timeout_seconds", self.upload_timeout_seconds),
             ("job_queue", self.job_queue as u64),
             ("cache_mib", self.cache_mib),
+            ("max_connections", self.max_connections as u64),
+            ("header_timeout_seconds", self.header_timeout_seconds),
         ];
+        if let Some(origin) = self.cors_origin.iter().find(|o| !is_origin(o)) {
+            return Err(ConfigError::OutOfRange {
+                name: "cors_origin",
+                expected: "* or a scheme and host without a path, such as https://viewer.example",
+                found: origin.clone(),
+            });
+        }
+        if !(8..=1024).contains(&self.max_header_kib) {
+            return Err(ConfigError::OutOfRange {
+                name: "max_header_kib",
+                expected: "between 8 and 1024",
+                found: self.max_header_kib.to_string(),
+            });
+        }
         match at_least_one.iter().find(|(_, value)| *value == 0) {
             Some(&(name, value)) => Err(ConfigError::OutOfRange {
                 name,
@@ -211,6 +261,18 @@ impl Config {
             listen: self.listen,
             allow_anonymous: self.allow_anonymous,
             check_keys: true,
+            tls_cert: given(&self.tls_cert),
+            tls_key: given(&self.tls_key),
+            max_connections: self.max_connections,
+            header_timeout: Duration::from_secs(self.header_timeout_seconds),
+            max_header_bytes: self.max_header_kib << 10,
+            cors_origins: self.cors_origin.clone(),
+            key_limits: KeyLimits {
+                queries_per_minute: Some(self.key_queries_per_minute).filter(|&n| n > 0),
+                stored_bytes: Some(self.key_max_stored_mib << 20).filter(|&n| n > 0),
+                classes: Some(self.key_max_classes).filter(|&n| n > 0),
+            },
+            slow_query: Some(Duration::from_millis(self.slow_query_ms)).filter(|d| !d.is_zero()),
             data_dir: self.data.clone(),
             store: StoreOptions {
                 cache_bytes: self.cache_mib << 20,

@@ -49,6 +49,22 @@ pub fn init(filter: &str, format: LogFormat) -> Result<(), TelemetryError> {
     .map_err(|_| TelemetryError::AlreadySet)
 }
 
+/// Logs every panic with its place, thread and message, within the span it happened in, instead of printing it.
+pub fn log_panics() {
+    std::panic::set_hook(Box::new(|panic| {
+        let place = panic.location().map(ToString::to_string).unwrap_or_default();
+        let said = panic.payload();
+        let message = said
+            .downcast_ref::<&str>()
+            .copied()
+            .or_else(|| said.downcast_ref::<String>().map(String::as_str))
+            .unwrap_or("without a message");
+        let thread = std::thread::current();
+        let thread = thread.name().unwrap_or_default();
+        tracing::error!(place, thread, message, "panic");
+    }));
+}
+
 /// A bare level filters everything that is ours and the warnings of everybody else.
 fn parse(filter: &str) -> Result<EnvFilter, TelemetryError> {
     let bare = filter.parse::<tracing_subscriber::filter::LevelFilter>();

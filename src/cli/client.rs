@@ -74,7 +74,10 @@ pub enum CallError {
 
 impl From<CallError> for CliError {
     fn from(error: CallError) -> Self {
-        Self::Failed(error.to_string())
+        match error {
+            CallError::Refused { code, detail } => Self::Refused { code, detail },
+            CallError::Unreachable(reason) => Self::Failed(reason),
+        }
     }
 }
 

@@ -22,6 +22,14 @@ pub enum CliError {
     /// The work failed.
     #[error("{0}")]
     Failed(String),
+    /// The service refused, and said why.
+    #[error("{detail}")]
+    Refused {
+        /// The problem's stable code.
+        code: String,
+        /// One sentence.
+        detail: String,
+    },
     /// What failed has been printed already.
     #[error("not everything succeeded")]
     Reported,
@@ -36,11 +44,19 @@ impl CliError {
         Self::Failed(format!("{}: {reason}", path.display()))
     }
 
+    /// The problem's stable code, where a service refused.
+    pub fn code(&self) -> Option<&str> {
+        match self {
+            Self::Refused { code, .. } => Some(code),
+            _ => None,
+        }
+    }
+
     /// What the shell is told.
     pub fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
             Self::Usage(_) => USAGE,
-            Self::Failed(_) | Self::Reported => FAILED,
+            Self::Failed(_) | Self::Refused { .. } | Self::Reported => FAILED,
             Self::OutputClosed => OK,
         })
     }
@@ -48,7 +64,7 @@ impl CliError {
     /// The line for stderr, unless there is nothing to add.
     pub fn message(&self) -> Option<String> {
         match self {
-            Self::Usage(_) | Self::Failed(_) => Some(format!("shapelex: {self}")),
+            Self::Usage(_) | Self::Failed(_) | Self::Refused { .. } => Some(format!("shapelex: {self}")),
             Self::Reported | Self::OutputClosed => None,
         }
     }

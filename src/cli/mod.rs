@@ -64,7 +64,7 @@ configuration.";
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Run the service
-    Serve(serve::ServeArgs),
+    Serve(Box<serve::ServeArgs>),
     /// Make a zoo, teach it to a service and recognise unseen poses, over HTTP
     Demo(demo::DemoArgs),
     /// Learn the classes of a folder per class

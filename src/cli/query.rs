@@ -57,10 +57,11 @@ pub fn run(args: &QueryArgs, json: bool) -> Result<(), CliError> {
             }
             Err(error) => {
                 refused = true;
+                let code = error.code().map(str::to_owned);
                 let refusal = Refused::new(path, error);
                 refusal.warn();
                 if json {
-                    output::json(&json!({ "file": refusal.file, "error": refusal.reason }))?;
+                    output::json(&json!({ "file": refusal.file, "error": refusal.reason, "code": code }))?;
                 }
             }
         }

@@ -34,14 +34,18 @@ pub fn run(args: &ServeArgs, json: bool) -> Result<(), CliError> {
         .resolve()
         .map_err(|error| usage(&error))?;
     telemetry::init(&config.log, config.log_format).map_err(|error| usage(&error))?;
+    telemetry::log_panics();
     tracing::info!(
         version = env!("CARGO_PKG_VERSION"),
         data = %config.data.display(),
         "starting"
     );
-    service::run_until(config.service(), service::interrupted(), |address| {
+    let service = config.service();
+    let secure = service.tls_cert.is_some();
+    service::run_until(service, service::interrupted(), |address| {
         tracing::info!(%address, "listening");
-        let url = format!("http://{address}");
+        let scheme = if secure { "https" } else { "http" };
+        let url = format!("{scheme}://{address}");
         let told = if json {
             output::json(&json!({ "listening": url }))
         } else {

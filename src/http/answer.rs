@@ -4,9 +4,10 @@ use super::admission::Work;
 use super::dto::class::ClassRef;
 use super::dto::query::{QueryAnswer, QueryOptions, RankedClass, RankedShape};
 use super::metrics;
-use super::problem::Problem;
+use super::problem::{Code, Problem};
 use super::problem_from::index_empty;
 use super::state::Parts;
+use super::time_limit::{TimeView, rank_until};
 use super::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
 use crate::model::ClassId;
@@ -26,6 +27,7 @@ pub fn answer(
     live: &LiveIndex,
     mesh: &UploadedMesh,
     options: &QueryOptions,
+    limit: Option<&TimeView>,
     work: &Work,
 ) -> Result<QueryAnswer, Problem> {
     metrics::time_wait(work.waited);
@@ -42,10 +44,19 @@ pub fn answer(
     let observer = |stage| watch.begin(stage);
     observer(Stage::Read);
     let (format, soup) = mesh.read(&state.config.limits)?;
-    let description = describe_query(soup, parameters, &work.cancel, &observer)?;
+    let stop = limit.map_or(&work.cancel, |limit| &limit.over);
+    let timely = |problem: Problem| match limit {
+        Some(limit) if problem.code == Code::Cancelled => limit.nothing_scored(),
+        _ => problem,
+    };
+    let description = describe_query(soup, parameters, stop, &observer).map_err(|e| timely(e.into()))?;
     observer(Stage::Ranking);
     let rank_by = options.rank_by.map_or(parameters.rank_by, Into::into);
-    let ranking = rank(&description.views, &index, rank_by, &work.cancel)?;
+    let ranked = match limit {
+        Some(_) => rank_until(&description.views, &index, rank_by, stop),
+        None => rank(&description.views, &index, rank_by, stop).map(|ranking| (ranking, Vec::new())),
+    };
+    let (ranking, left) = ranked.map_err(|e| timely(e.into()))?;
     let stages = watch.end();
     for (stage, took) in &stages {
         metrics::time_stage(*stage, *took);
@@ -91,6 +102,8 @@ pub fn answer(
         nearest_shapes: shapes.collect(),
         confidence: ranking.confidence,
         compared,
+        partial: !left.is_empty(),
+        not_compared: left.iter().map(|label| class_of(label)).collect(),
         signatures: ranking.signatures,
         format: format.extension().to_owned(),
         warnings: description.report.warnings.clone(),

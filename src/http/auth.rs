@@ -71,38 +71,46 @@ pub fn needs_a_key_to_start(config: &ServiceConfig) -> bool {
     config.check_keys && !config.listen.ip().is_loopback() && !config.allow_anonymous
 }
 
-/// Finds out who asks, and whether they may.
-///
-/// # Errors
-/// `unauthorized`, `insufficient_scope`.
-pub fn authorize(parts: &Parts, headers: &HeaderMap, access: Access) -> Result<Caller, Problem> {
+/// Finds out who asks, and whether they may: `unauthorized` or `insufficient_scope` where they may not.
+pub fn authorize(parts: &Parts, headers: &HeaderMap, access: Access) -> (Caller, Result<(), Problem>) {
     let Access::Needs(scope) = access else {
-        return Ok(Caller::default());
+        return (Caller::default(), Ok(()));
     };
     if !keys_are_on(parts) {
-        return Ok(Caller::default());
+        return (Caller::default(), Ok(()));
     }
-    let refuse = |detail: &str| Problem::new(Code::Unauthorized, detail);
-    let secret = presented(headers).ok_or_else(|| {
-        refuse("send an API key, as 'Authorization: Bearer slx_…' or 'X-API-Key: slx_…'; `shapelex keys create` makes one")
-    })?;
+    let key = match identify(parts, headers) {
+        Ok(key) => key,
+        Err(detail) => return (Caller::default(), Err(Problem::new(Code::Unauthorized, detail))),
+    };
+    let (has, needs) = (key.scope, scope.name());
+    let detail = format!(
+        "this needs a key of scope '{needs}', '{}' has '{}'",
+        key.name,
+        has.name()
+    );
+    let caller = Caller { key: Some(key) };
+    if has >= scope {
+        return (caller, Ok(()));
+    }
+    let problem = Problem::new(Code::InsufficientScope, detail)
+        .with("scope", has.name())
+        .with("needed", needs);
+    (caller, Err(problem))
+}
+
+fn identify(parts: &Parts, headers: &HeaderMap) -> Result<Arc<ApiKey>, &'static str> {
+    let secret = presented(headers).ok_or(
+        "send an API key, as 'Authorization: Bearer slx_…' or 'X-API-Key: slx_…'; `shapelex keys create` makes one",
+    )?;
     let key = parts
         .keys
         .find(secret)
-        .ok_or_else(|| refuse("the API key is not one of this service's; it may have been revoked"))?;
+        .ok_or("the API key is not one of this service's; it may have been revoked")?;
     if key.is_expired(Timestamp::now()) {
-        return Err(refuse("the API key has expired"));
+        return Err("the API key has expired");
     }
-    if key.scope < scope {
-        let (has, needs) = (key.scope.name(), scope.name());
-        return Err(Problem::new(
-            Code::InsufficientScope,
-            format!("this needs a key of scope '{needs}', '{}' has '{has}'", key.name),
-        )
-        .with("scope", has)
-        .with("needed", needs));
-    }
-    Ok(Caller { key: Some(key) })
+    Ok(key)
 }
 
 /// The secret a request brings. What is not visible ASCII is no secret.

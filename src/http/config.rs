@@ -4,6 +4,7 @@ use super::archive::ArchiveLimits;
 use super::upload::UploadLimits;
 use crate::jobs::JobOptions;
 use crate::mesh::Limits;
+use crate::model::KeyLimits;
 use crate::parameters::Preset;
 use crate::store::StoreOptions;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -19,6 +20,22 @@ pub struct ServiceConfig {
     pub allow_anonymous: bool,
     /// Whether keys are looked at. Not so for callers inside this process, who have the data directory anyway.
     pub check_keys: bool,
+    /// The certificate chain of HTTPS, PEM.
+    pub tls_cert: Option<PathBuf>,
+    /// Its private key, PEM.
+    pub tls_key: Option<PathBuf>,
+    /// Connections served at a time.
+    pub max_connections: usize,
+    /// How long the head of a request may take to arrive, and a connection may idle.
+    pub header_timeout: Duration,
+    /// Longest head of a request, in bytes.
+    pub max_header_bytes: usize,
+    /// Origins whose pages may call the API; `*` for all.
+    pub cors_origins: Vec<String>,
+    /// How much an API key may do that does not say otherwise.
+    pub key_limits: KeyLimits,
+    /// Queries that take longer are logged.
+    pub slow_query: Option<Duration>,
     /// Where it keeps everything.
     pub data_dir: PathBuf,
     /// How the store is opened.
@@ -61,6 +78,14 @@ impl Default for ServiceConfig {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 7878)),
             allow_anonymous: false,
             check_keys: true,
+            tls_cert: None,
+            tls_key: None,
+            max_connections: 1024,
+            header_timeout: Duration::from_secs(20),
+            max_header_bytes: 32 << 10,
+            cors_origins: Vec::new(),
+            key_limits: KeyLimits::default(),
+            slow_query: None,
             data_dir: PathBuf::from("shapelex-data"),
             store: StoreOptions::default(),
             max_body_bytes: 128 << 20,

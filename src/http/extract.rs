@@ -6,9 +6,13 @@ use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::header;
 use axum::http::request::Parts;
 use serde::de::DeserializeOwned;
+use std::time::Duration;
 
 /// The longest JSON body, in bytes.
 pub const MAX_JSON_BYTES: usize = 256 << 10;
+
+/// How long a JSON body may take to arrive.
+const JSON_WITHIN: Duration = Duration::from_secs(30);
 
 /// Path parameters.
 pub struct ApiPath<T>(pub T);
@@ -69,8 +73,17 @@ async fn body(request: Request) -> Result<bytes::Bytes, Problem> {
         .headers()
         .get(header::CONTENT_TYPE)
         .map(|v| String::from_utf8_lossy(v.as_bytes()).to_ascii_lowercase());
-    let bytes = axum::body::to_bytes(request.into_body(), MAX_JSON_BYTES)
+    let receiving = axum::body::to_bytes(request.into_body(), MAX_JSON_BYTES);
+    let bytes = tokio::time::timeout(JSON_WITHIN, receiving)
         .await
+        .map_err(|_| {
+            let seconds = JSON_WITHIN.as_secs();
+            Problem::new(
+                Code::RequestTimeout,
+                format!("the body did not arrive within {seconds} s"),
+            )
+            .with("limit_seconds", seconds)
+        })?
         .map_err(|_| body_too_large(MAX_JSON_BYTES))?;
     let essence = media_type
         .as_deref()

@@ -6,11 +6,13 @@
 pub mod admission;
 pub mod answer;
 pub mod archive;
+pub mod audit;
 pub mod auth;
 pub mod config;
 pub mod dto;
 pub mod extract;
 pub mod keyring;
+pub mod limits;
 pub mod metrics;
 pub mod openapi;
 pub mod problem;
@@ -20,6 +22,9 @@ pub mod router;
 mod routes;
 pub mod serve;
 pub mod state;
+mod time_limit;
+mod tls;
+mod trace_context;
 pub mod upload;
 pub mod uploaded;
 

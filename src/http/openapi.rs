@@ -191,7 +191,7 @@ fn problems_of(operation: &str) -> Vec<Code> {
         "get_readiness" => vec![NotReady],
         "get_index" | "get_parameters" => vec![],
         "list_classes" => vec![InvalidQuery, InvalidCursor],
-        "create_class" => [JSON, WRITE, &[InvalidName, ClassExists]].concat(),
+        "create_class" => [JSON, WRITE, &[InvalidName, ClassExists, QuotaExceeded]].concat(),
         "get_class" => vec![InvalidRequest, ClassNotFound],
         "rename_class" => [
             JSON,
@@ -211,7 +211,13 @@ fn problems_of(operation: &str) -> Vec<Code> {
             MESH,
             POOL,
             WRITE,
-            &[InvalidName, ClassNotFound, UploadRejected, NoAnimation],
+            &[
+                InvalidName,
+                ClassNotFound,
+                UploadRejected,
+                NoAnimation,
+                QuotaExceeded,
+            ],
         ]
         .concat(),
         "list_shapes" => vec![InvalidRequest, InvalidQuery, InvalidCursor, ClassNotFound],
@@ -222,6 +228,8 @@ fn problems_of(operation: &str) -> Vec<Code> {
             JSON,
             WRITE,
             &[
+                InvalidRequest,
+                IdempotencyKeyReused,
                 InvalidParameter,
                 ClassNotFound,
                 NothingToIndex,
@@ -240,20 +248,21 @@ fn problems_of(operation: &str) -> Vec<Code> {
             UPLOAD,
             MESH,
             POOL,
-            &[OneMeshExpected, IndexEmpty, IndexIncomplete],
+            &[OneMeshExpected, IndexEmpty, IndexIncomplete, RateLimited],
         ]
         .concat(),
-        "query_batch" => [UPLOAD, &[IndexEmpty]].concat(),
+        "query_batch" => [UPLOAD, &[IndexEmpty, RateLimited]].concat(),
         _ => vec![],
     };
     if access_of(operation) != Access::Public {
         codes.extend([Unauthorized, InsufficientScope]);
     }
-    codes.push(Internal);
+    codes.extend([UriTooLong, Internal]);
     codes
 }
 
 const JSON: &[Code] = &[
+    Code::RequestTimeout,
     Code::InvalidJson,
     Code::InvalidField,
     Code::BodyTooLarge,

@@ -47,6 +47,10 @@ codes! {
     InvalidParameter, "invalid_parameter", 422, "A parameter is outside its range";
     Unauthorized, "unauthorized", 401, "A valid API key is needed";
     InsufficientScope, "insufficient_scope", 403, "The API key does not allow this";
+    RateLimited, "rate_limited", 429, "The API key's queries per minute are used up";
+    QuotaExceeded, "quota_exceeded", 403, "The API key may have no more of this";
+    IdempotencyKeyReused, "idempotency_key_reused", 422, "The idempotency key was used for another request";
+    UriTooLong, "uri_too_long", 414, "The address is longer than the limit";
     RouteNotFound, "route_not_found", 404, "There is nothing at this address";
     MethodNotAllowed, "method_not_allowed", 405, "This address does not answer that method";
     RequestTimeout, "request_timeout", 408, "The request took too long to arrive";
@@ -185,6 +189,16 @@ impl Problem {
         if let Some(challenge) = self.challenge() {
             headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static(challenge));
         }
+        if self.code == Code::RateLimited
+            && let Some(limit) = self.extra.get("limit").and_then(Value::as_u64)
+        {
+            headers.insert("ratelimit-limit", HeaderValue::from(limit));
+            headers.insert("ratelimit-remaining", HeaderValue::from(0));
+            headers.insert(
+                "ratelimit-reset",
+                HeaderValue::from(self.retry_after().unwrap_or(60)),
+            );
+        }
         if let Some(seconds) = self.retry_after() {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
         }
@@ -200,9 +214,10 @@ impl Problem {
         }
     }
 
-    /// Seconds after which trying again makes sense; every 503 says so.
+    /// Seconds after which trying again makes sense; every 503 and 429 says so.
     fn retry_after(&self) -> Option<u64> {
-        (self.code.status() == StatusCode::SERVICE_UNAVAILABLE).then(|| {
+        let later = [StatusCode::SERVICE_UNAVAILABLE, StatusCode::TOO_MANY_REQUESTS];
+        later.contains(&self.code.status()).then(|| {
             self.extra
                 .get("retry_after_seconds")
                 .and_then(Value::as_u64)

@@ -1,9 +1,12 @@
 //! What happens around every handler: a request id, a span, metrics, and a problem document for whatever failed.
 
+use super::audit::Entry;
 use super::auth::{Access, access_of, authorize};
 use super::metrics;
 use super::problem::{Code, Problem};
 use super::state::AppState;
+use super::trace_context::trace_parent;
+use crate::model::Scope;
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
@@ -35,21 +38,34 @@ pub async fn around(State(state): State<AppState>, mut request: Request, next: N
         None => Access::Public,
         Some(_) => access_of(operation),
     };
-    let span = tracing::info_span!("request", request_id = %id, operation, %method, path, key = Empty);
+    let span = tracing::info_span!(
+        "request", request_id = %id, operation, %method, path, key = Empty, trace_id = Empty, parent_span = Empty
+    );
+    if let Some(parent) = trace_parent(request.headers()) {
+        span.record("trace_id", parent.trace);
+        span.record("parent_span", parent.span);
+    }
     let began = Instant::now();
-    let response = match authorize(&state, request.headers(), access) {
-        Ok(caller) => {
+    let (caller, allowed) = authorize(&state, request.headers(), access);
+    let allowed = allowed.and_then(|()| check_length(&request));
+    let response = match allowed {
+        Ok(()) => {
             if caller.key.is_some() {
                 span.record("key", caller.name());
             }
-            request.extensions_mut().insert(caller);
+            request.extensions_mut().insert(caller.clone());
             next.run(request).instrument(span.clone()).await
         }
         Err(problem) => problem.into_response(),
     };
     let took = began.elapsed();
-    let mut response = span.in_scope(|| finish(response, &id));
+    let (mut response, outcome) = span.in_scope(|| finish(response, &id));
     let status = response.status();
+    let writes = matches!(access, Access::Needs(scope) if scope > Scope::Read);
+    if writes && method != Method::GET && method != Method::HEAD {
+        let entry = Entry::new(&id, &caller, operation, &path, status.as_u16(), outcome);
+        state.audit.write(&entry);
+    }
     metrics::count_request(operation, status.as_u16(), took);
     let milliseconds = took.as_secs_f64() * 1e3;
     span.in_scope(|| {
@@ -68,6 +84,14 @@ pub async fn around(State(state): State<AppState>, mut request: Request, next: N
         header::X_CONTENT_TYPE_OPTIONS,
         HeaderValue::from_static("nosniff"),
     );
+    headers
+        .entry(header::CONTENT_SECURITY_POLICY)
+        .or_insert(HeaderValue::from_static(
+            "default-src 'none'; frame-ancestors 'none'",
+        ));
+    headers
+        .entry(header::REFERRER_POLICY)
+        .or_insert(HeaderValue::from_static("no-referrer"));
     if state.stopping.is_cancelled() {
         headers.insert(header::CONNECTION, HeaderValue::from_static("close"));
     }
@@ -91,11 +115,23 @@ pub async fn route_not_found(request: Request) -> Problem {
     )
 }
 
-/// Turns whatever failed into a problem document with the request's id.
-fn finish(mut response: Response, id: &str) -> Response {
+/// Longest path with its query, in bytes.
+const MAX_URI_BYTES: usize = 8 << 10;
+
+fn check_length(request: &Request) -> Result<(), Problem> {
+    let length = request.uri().path_and_query().map_or(0, |p| p.as_str().len());
+    if length <= MAX_URI_BYTES {
+        return Ok(());
+    }
+    let detail = format!("the address has {length} bytes, at most {MAX_URI_BYTES} are read");
+    Err(Problem::new(Code::UriTooLong, detail).with("limit_bytes", MAX_URI_BYTES))
+}
+
+/// Turns whatever failed into a problem document with the request's id. Also gives `done` or the problem's code.
+fn finish(mut response: Response, id: &str) -> (Response, &'static str) {
     let status = response.status();
     if !status.is_client_error() && !status.is_server_error() {
-        return response;
+        return (response, "done");
     }
     let problem = response
         .extensions_mut()
@@ -111,7 +147,7 @@ fn finish(mut response: Response, id: &str) -> Response {
     if let Some(allow) = response.headers_mut().remove(header::ALLOW) {
         rendered.headers_mut().insert(header::ALLOW, allow);
     }
-    rendered
+    (rendered, problem.code.name())
 }
 
 /// A problem for a failure that axum or a layer answered by itself.
@@ -123,6 +159,7 @@ fn from_status(status: StatusCode) -> Problem {
         StatusCode::METHOD_NOT_ALLOWED => Code::MethodNotAllowed,
         StatusCode::REQUEST_TIMEOUT => Code::RequestTimeout,
         StatusCode::PAYLOAD_TOO_LARGE => Code::BodyTooLarge,
+        StatusCode::URI_TOO_LONG => Code::UriTooLong,
         StatusCode::UNSUPPORTED_MEDIA_TYPE => Code::UnsupportedMediaType,
         StatusCode::SERVICE_UNAVAILABLE => Code::Overloaded,
         StatusCode::GATEWAY_TIMEOUT => Code::DeadlineExceeded,

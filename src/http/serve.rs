@@ -1,9 +1,24 @@
 //! From settings to a listening service, and back down in good order.
+//!
+//! A connection is cut where its client dribbles: the head of a request has a time limit, a size limit and, over TLS,
+//! a handshake limit; bodies have theirs in [`super::upload`] and [`super::extract`]. Connections beyond the limit wait
+//! to be served until another one ends.
 
 use super::router::router;
 use super::state::{AppState, OpenError};
-use std::future::{Future, IntoFuture};
+use super::tls::{Tls, TlsError};
+use axum::Router;
+use axum::extract::Request;
+use axum_server::{Handle, Server};
+use std::convert::Infallible;
+use std::future::Future;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use std::time::Duration;
 use tokio::net::TcpListener;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tower::Service;
 
 /// Why serving ended early.
 #[derive(Debug, thiserror::Error)]
@@ -11,6 +26,9 @@ pub enum ServeError {
     /// The service did not start.
     #[error(transparent)]
     Open(#[from] OpenError),
+    /// The certificate or its key cannot be used.
+    #[error(transparent)]
+    Tls(#[from] TlsError),
     /// The listener failed.
     #[error("the listener failed: {0}")]
     Listener(#[from] std::io::Error),
@@ -20,28 +38,27 @@ pub enum ServeError {
 /// until the deadline, the running job goes back to the queue, and everything is flushed.
 ///
 /// # Errors
-/// [`ServeError`] where the listener fails.
+/// [`ServeError`] where the certificate cannot be used or the listener fails.
 pub async fn serve(
     state: AppState,
     listener: TcpListener,
     shutdown: impl Future<Output = ()> + Send + 'static,
 ) -> Result<(), ServeError> {
-    let stopping = state.stopping.clone();
-    let stop = stopping.clone();
-    let server = axum::serve(listener, router(state.clone())).with_graceful_shutdown(async move {
+    let tls = Tls::load(&state.config)?;
+    let handle = Handle::new();
+    let deadline = state.config.shutdown_timeout;
+    let stop = async {
         shutdown.await;
         tracing::info!("shutting down");
-        stop.cancel();
-    });
-    let deadline = state.config.shutdown_timeout;
-    let overdue = async {
-        stopping.cancelled().await;
+        state.stopping.cancel();
+        handle.graceful_shutdown(Some(deadline));
         tokio::time::sleep(deadline).await;
     };
     let served = tokio::select! {
-        served = server.into_future() => served,
-        () = overdue => {
+        served = accept(&state, listener, tls, handle.clone()) => served,
+        () = stop => {
             tracing::warn!(?deadline, "requests were still running at the deadline and are dropped");
+            handle.shutdown();
             Ok(())
         }
     };
@@ -59,4 +76,89 @@ pub async fn serve(
         tracing::error!(%error, "closing failed");
     }
     Ok(served?)
+}
+
+async fn accept(
+    state: &AppState,
+    listener: TcpListener,
+    tls: Tls,
+    handle: Handle<SocketAddr>,
+) -> std::io::Result<()> {
+    let config = &state.config;
+    let connections = Connections {
+        router: router(state.clone()),
+        places: Arc::clone(&state.connections),
+    };
+    let mut server = Server::<SocketAddr>::from_listener(listener)
+        .http1_only()
+        .handle(handle)
+        .first_request_timeout(config.header_timeout);
+    server
+        .http_builder()
+        .http1()
+        .header_read_timeout(Some(config.header_timeout))
+        .max_buf_size(config.max_header_bytes.max(SMALLEST_BUFFER))
+        .keep_alive(true);
+    tls.serve(
+        server,
+        connections,
+        config.header_timeout.max(Duration::from_secs(1)),
+    )
+    .await
+}
+
+/// hyper takes no smaller one.
+const SMALLEST_BUFFER: usize = 8192;
+
+/// Makes the service of each connection, which holds a place until the connection ends.
+#[derive(Clone)]
+pub(super) struct Connections {
+    router: Router,
+    places: Arc<Semaphore>,
+}
+
+impl Service<SocketAddr> for Connections {
+    type Response = Connection;
+    type Error = Infallible;
+    type Future = std::pin::Pin<Box<dyn Future<Output = Result<Connection, Infallible>> + Send>>;
+
+    fn poll_ready(&mut self, _: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
+        Poll::Ready(Ok(()))
+    }
+
+    fn call(&mut self, _: SocketAddr) -> Self::Future {
+        let (router, places) = (self.router.clone(), Arc::clone(&self.places));
+        Box::pin(async move {
+            // Nobody closes the semaphore; without a place the connection would be served all the same.
+            let place = places.acquire_owned().await.ok().map(Arc::new);
+            Ok(Connection {
+                router,
+                _place: place,
+            })
+        })
+    }
+}
+
+/// The routes, as one connection sees them.
+#[derive(Clone)]
+pub(super) struct Connection {
+    router: Router,
+    _place: Option<Arc<OwnedSemaphorePermit>>,
+}
+
+impl<B> Service<Request<B>> for Connection
+where
+    Router: Service<Request<B>>,
+{
+    type Response = <Router as Service<Request<B>>>::Response;
+    type Error = <Router as Service<Request<B>>>::Error;
+    type Future = <Router as Service<Request<B>>>::Future;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
+        Service::<Request<B>>::poll_ready(&mut self.router, context)
+    }
+
+    fn call(&mut self, request: Request<B>) -> Self::Future {
+        Service::<Request<B>>::call(&mut self.router, request)
+    }
 }

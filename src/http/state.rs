@@ -1,9 +1,11 @@
 //! What every handler shares.
 
 use super::admission::{Compute, ComputeOptions};
+use super::audit::Audit;
 use super::auth;
 use super::config::ServiceConfig;
 use super::keyring::Keyring;
+use super::limits::Limits;
 use super::problem::Problem;
 use super::{metrics, openapi};
 use crate::jobs::{JobError, Jobs};
@@ -11,6 +13,7 @@ use crate::store::{Health, Store, StoreError};
 use std::net::SocketAddr;
 use std::ops::Deref;
 use std::sync::{Arc, Mutex};
+use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 /// Why the service did not start.
@@ -36,6 +39,9 @@ pub enum OpenError {
         /// Its data directory.
         data: std::path::PathBuf,
     },
+    /// The audit log cannot be written.
+    #[error("the audit log could not be opened: {0}")]
+    Audit(std::io::Error),
     /// The API's document could not be written.
     #[error("the OpenAPI document could not be written: {0}")]
     Document(String),
@@ -53,6 +59,12 @@ pub struct Parts {
     pub store: Store,
     /// The API keys.
     pub keys: Keyring,
+    /// How much each key has used.
+    pub limits: Limits,
+    /// Who changed what.
+    pub audit: Audit,
+    /// Places for connections.
+    pub connections: Arc<Semaphore>,
     /// The job queue and the live index.
     pub jobs: Jobs,
     /// Where requests compute.
@@ -110,6 +122,7 @@ impl AppState {
                 data: config.data_dir,
             });
         }
+        let audit = Audit::open(&config.data_dir).map_err(OpenError::Audit)?;
         let jobs = Jobs::start(store.clone(), config.job_options())?;
         let compute = Compute::new(ComputeOptions {
             threads: config.query_threads,
@@ -117,15 +130,20 @@ impl AppState {
             wait: config.query_wait,
         })?;
         Ok(Self(Arc::new(Parts {
-            config,
             store,
             keys,
+            limits: Limits::new(config.key_limits),
+            audit,
+            connections: Arc::new(Semaphore::new(
+                config.max_connections.clamp(1, Semaphore::MAX_PERMITS),
+            )),
             jobs,
             compute,
             catalogue: Mutex::new(()),
             stopping: CancellationToken::new(),
             document_yaml,
             document_json,
+            config,
         })))
     }
 

@@ -17,7 +17,7 @@ pub use live::LiveIndex;
 
 use crate::cancel::Cancel;
 use crate::mesh::Limits;
-use crate::model::{Job, JobId, JobKind, JobState};
+use crate::model::{ContentHash, Job, JobId, JobKind, JobState};
 use crate::store::Store;
 use arc_swap::ArcSwap;
 use jiff::Timestamp;
@@ -193,6 +193,18 @@ impl Jobs {
     /// # Errors
     /// [`JobError::Parameter`]; [`JobError::QueueFull`]; [`JobError::ShuttingDown`]; [`JobError::Store`].
     pub fn enqueue(&self, kind: JobKind) -> Result<Job, JobError> {
+        self.enqueue_answering(kind, None)
+    }
+
+    /// As [`enqueue`](Self::enqueue); remembers in the same write which request, under which key, the job answers.
+    ///
+    /// # Errors
+    /// As [`enqueue`](Self::enqueue).
+    pub fn enqueue_answering(
+        &self,
+        kind: JobKind,
+        answers: Option<(ContentHash, ContentHash)>,
+    ) -> Result<Job, JobError> {
         let JobKind::Reindex { parameters, .. } = &kind;
         if let Some(parameters) = parameters {
             parameters.validate()?;
@@ -206,7 +218,7 @@ impl Jobs {
             return Err(JobError::QueueFull { limit });
         }
         let job = Job::new(kind, Timestamp::now());
-        self.inner.store.put_job(&job, true)?;
+        self.inner.store.put_new_job(&job, answers)?;
         state.waiting.push_back(job.id);
         state.channels.insert(job.id, watch::Sender::new(job.clone()));
         self.inner.count(&state);

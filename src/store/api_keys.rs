@@ -3,7 +3,7 @@
 use super::event::Event;
 use super::payload::{instant, only, pack, unpack};
 use super::record::{Family, Record};
-use super::{Store, StoreError, keys, record};
+use super::{Batch, Store, StoreError, keys, record};
 use crate::model::{ApiKey, KeyHash, KeyId, KeyLimits, KeyName, Scope};
 use serde::{Deserialize, Serialize};
 
@@ -113,6 +113,10 @@ impl Store {
         if self.inner.backend.get(&keys::api_key(id))?.is_none() {
             return Err(StoreError::NoKey { id });
         }
-        self.happen(&mut writer, &Event::KeyRevoked { id })
+        let mut more = Batch::default();
+        for (used, _) in self.inner.backend.scan(&keys::used_by(id), None, usize::MAX)? {
+            more.delete(used);
+        }
+        self.inner.record(&mut writer, &Event::KeyRevoked { id }, more)
     }
 }

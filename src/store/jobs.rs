@@ -15,6 +15,12 @@ impl Store {
     /// # Errors
     /// [`StoreError::ReadOnly`], or the write's failure.
     pub fn put_job(&self, job: &Job, durable: bool) -> Result<(), StoreError> {
+        let batch = self.job_batch(job)?;
+        self.inner.commit(&batch, durable)
+    }
+
+    /// The writes that keep a job.
+    pub(super) fn job_batch(&self, job: &Job) -> Result<Batch, StoreError> {
         let mut batch = Batch::default();
         put(&mut batch, keys::job(job.id), job)?;
         if job.state.is_finished() {
@@ -22,7 +28,7 @@ impl Store {
         } else {
             put(&mut batch, keys::queue(job.id), &QueueLink::to_job(job.id))?;
         }
-        self.inner.commit(&batch, durable)
+        Ok(batch)
     }
 
     /// A job.

@@ -14,6 +14,8 @@ pub(super) const GENERATION: &[u8] = b"generation/";
 pub(super) const JOB: &[u8] = b"job/";
 pub(super) const QUEUE: &[u8] = b"queue/";
 pub(super) const API_KEY: &[u8] = b"api-key/";
+pub(super) const USAGE: &[u8] = b"usage/";
+pub(super) const IDEMPOTENCY: &[u8] = b"idempotency/";
 
 /// `meta/sequence`: the number of the last catalogue event applied.
 pub(super) const META_SEQUENCE: &[u8] = b"meta/sequence";
@@ -80,4 +82,28 @@ pub(super) fn queue(id: JobId) -> Vec<u8> {
 
 pub(super) fn api_key(id: KeyId) -> Vec<u8> {
     join(&[API_KEY, &id.to_bytes()])
+}
+
+pub(super) fn used_by(key: KeyId) -> Vec<u8> {
+    join(&[USAGE, &key.to_bytes()])
+}
+
+pub(super) fn used_classes(key: KeyId) -> Vec<u8> {
+    join(&[USAGE, &key.to_bytes(), b"c"])
+}
+
+pub(super) fn used_class(key: KeyId, class: ClassId) -> Vec<u8> {
+    join(&[USAGE, &key.to_bytes(), b"c", &class.to_bytes()])
+}
+
+pub(super) fn used_shapes(key: KeyId) -> Vec<u8> {
+    join(&[USAGE, &key.to_bytes(), b"s"])
+}
+
+pub(super) fn used_shape(key: KeyId, shape: ShapeId) -> Vec<u8> {
+    join(&[USAGE, &key.to_bytes(), b"s", &shape.to_bytes()])
+}
+
+pub(super) fn idempotency(key: ContentHash) -> Vec<u8> {
+    join(&[IDEMPOTENCY, &key.to_bytes()])
 }

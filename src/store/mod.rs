@@ -21,6 +21,7 @@ mod files;
 pub mod fuzzing;
 mod garbage;
 mod generations;
+mod idempotency;
 mod jobs;
 mod keys;
 pub mod memory_backend;
@@ -33,6 +34,7 @@ mod rebuild;
 pub mod record;
 mod signatures;
 mod sled_backend;
+mod usage;
 
 pub use api_keys::MAX_KEYS;
 pub use backend::Backend;
@@ -40,8 +42,10 @@ pub use catalogue::AddedShape;
 pub use dictionaries::Dictionaries;
 pub use error::StoreError;
 pub use garbage::Garbage;
+pub use idempotency::Remembered;
 pub use memory_backend::MemoryBackend;
 pub use migrate::FORMAT;
+pub use usage::Usage;
 
 use backend::Batch;
 use catalogue_log::CatalogueLog;

@@ -17,7 +17,14 @@ use std::path::Path;
 const CHUNK: usize = 256;
 
 /// Families the log cannot give back; their intact records are carried over.
-const CARRIED: [&[u8]; 4] = [keys::DICTIONARY, keys::GENERATION, keys::JOB, keys::QUEUE];
+const CARRIED: [&[u8]; 6] = [
+    keys::DICTIONARY,
+    keys::GENERATION,
+    keys::JOB,
+    keys::QUEUE,
+    keys::USAGE,
+    keys::IDEMPOTENCY,
+];
 
 /// Opens the records, rebuilding them first where they are damaged.
 pub(super) fn open_records(

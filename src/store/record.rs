@@ -48,6 +48,8 @@ pub enum Family {
     Signatures = 12,
     /// An API key.
     ApiKey = 13,
+    /// A request that was answered with a job.
+    Idempotency = 14,
 }
 
 /// A value with a family, a version and an encoding.

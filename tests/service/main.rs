@@ -4,10 +4,14 @@
 mod bad_input;
 mod batch;
 mod catalogue;
+mod connections;
 mod contract;
+mod dashboards;
 mod flow;
 mod harness;
+mod limits;
 mod meshes;
 mod operation;
+mod promises;
 mod security;
 mod uploads;

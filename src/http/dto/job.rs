@@ -22,7 +22,7 @@ pub enum ScopeDto {
 
 /// A reindex. Everything may be left out: `{}` and an empty body learn what is stale with the parameters the index
 /// has.
-#[derive(Clone, Debug, Default, Deserialize, ToSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 #[schema(example = json!({"scope": "stale", "preset": "default", "parameters": {"atoms": 128}}))]
 pub struct StartReindex {

@@ -20,6 +20,10 @@ pub struct QueryOptions {
     pub rank_by: Option<RankByName>,
     /// What a raw body is called, such as `dog0.obj`.
     pub name: Option<String>,
+    /// Milliseconds from the arrival of the mesh after which the best ranking so far is answered, marked `partial`.
+    /// Where not even one class was scored by then, the query fails with `deadline_exceeded`.
+    #[param(minimum = 1)]
+    pub time_limit_ms: Option<u64>,
 }
 
 /// How well a class regenerates the query.
@@ -75,6 +79,10 @@ pub struct QueryAnswer {
     pub confidence: f64,
     /// Classes that were compared with.
     pub compared: usize,
+    /// Whether the time limit came before all classes were compared with.
+    pub partial: bool,
+    /// The classes that were not; empty unless `partial`.
+    pub not_compared: Vec<ClassRef>,
     /// Signatures that were coded.
     pub signatures: usize,
     /// The mesh's format.

@@ -1,9 +1,11 @@
 //! Classes: made, listed, shown, renamed, deleted.
 
 use crate::http::AppState;
+use crate::http::auth::Caller;
 use crate::http::dto::class::{ClassDto, CreateClass, RenameClass};
 use crate::http::dto::{Page, PageQuery};
 use crate::http::extract::{ApiJson, ApiPath, ApiQuery};
+use crate::http::limits;
 use crate::http::problem::{Code, Problem};
 use crate::model::{Class, ClassId, ClassName};
 use crate::store::{Store, StoreError};
@@ -26,10 +28,18 @@ use std::sync::PoisonError;
 )]
 pub async fn create_class(
     State(state): State<AppState>,
+    caller: Caller,
     ApiJson(body): ApiJson<CreateClass>,
 ) -> Result<Response, Problem> {
     let name = ClassName::new(&body.name)?;
-    let class = state.blocking(move |s| Ok(s.store.create_class(name)?)).await?;
+    let class = state
+        .blocking(move |s| {
+            s.limits.check_quota(s, &caller, 1, 0)?;
+            let class = s.store.create_class(name)?;
+            limits::note(s, &caller, Some(class.id), &[]);
+            Ok(class)
+        })
+        .await?;
     let location = format!("/v1/classes/{}", class.id);
     let mut response = answer(&state, StatusCode::CREATED, class);
     insert(&mut response, header::LOCATION, &location);
@@ -63,17 +73,34 @@ pub async fn list_classes(
 /// Show a class
 #[utoipa::path(
     get, path = "/v1/classes/{class}", tag = "classes",
-    params(("class" = String, Path, description = "Its id or its name", example = "dog")),
-    responses((status = 200, description = "The class", body = ClassDto, headers(
-        ("etag" = String, description = "For `if-match`"),
-    )))
+    params(
+        ("class" = String, Path, description = "Its id or its name", example = "dog"),
+        ("if-none-match" = Option<String>, Header, description = "The `etag` of the copy at hand"),
+    ),
+    responses(
+        (status = 200, description = "The class", body = ClassDto, headers(
+            ("etag" = String, description = "For `if-match` and `if-none-match`"),
+        )),
+        (status = 304, description = "The copy at hand is as it is"),
+    )
 )]
 pub async fn get_class(
     State(state): State<AppState>,
     ApiPath(class): ApiPath<String>,
+    headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let class = state.blocking(move |s| find_class(&s.store, &class)).await?;
-    Ok(answer(&state, StatusCode::OK, class))
+    let answer = answer(&state, StatusCode::OK, class);
+    let tag = answer
+        .headers()
+        .get(header::ETAG)
+        .and_then(|tag| tag.to_str().ok());
+    if !tag.is_some_and(|tag| is_at_hand(&headers, tag)) {
+        return Ok(answer);
+    }
+    let mut unchanged = StatusCode::NOT_MODIFIED.into_response();
+    insert(&mut unchanged, header::ETAG, tag.unwrap_or_default());
+    Ok(unchanged)
 }
 
 /// Rename a class
@@ -154,26 +181,51 @@ pub(super) fn find_class(store: &Store, text: &str) -> Result<Class, Problem> {
 }
 
 fn answer(state: &AppState, status: StatusCode, class: Class) -> Response {
-    let tag = etag(&class);
     let live = state.jobs.live_index();
+    let tag = format!(
+        "\"{}-{}\"",
+        version(&class),
+        live.generation.as_ref().map_or(0, |g| g.number)
+    );
     let body = ClassDto::new(class, live.generation.as_ref());
     let mut response = (status, Json(body)).into_response();
     insert(&mut response, header::ETAG, &tag);
     response
 }
 
-fn etag(class: &Class) -> String {
-    format!("\"{}-{}\"", class.revision, class.updated_at.as_microsecond())
+/// What changes whenever the class does. The whole tag also has the generation it is seen from, since the answer says
+/// how the class stands to that; a reindex is no change of the class, so `if-match` does not look there.
+fn version(class: &Class) -> String {
+    format!("{}-{}", class.revision, class.updated_at.as_microsecond())
+}
+
+/// Whether `if-none-match` has this tag.
+pub(super) fn is_at_hand(headers: &HeaderMap, tag: &str) -> bool {
+    headers
+        .get(header::IF_NONE_MATCH)
+        .and_then(|v| v.to_str().ok())
+        .is_some_and(|list| {
+            list.split(',')
+                .map(|one| one.trim().trim_start_matches("W/"))
+                .any(|one| one == "*" || one == tag)
+        })
 }
 
 fn check_match(headers: &HeaderMap, class: &Class) -> Result<(), Problem> {
     let Some(wanted) = headers.get(header::IF_MATCH) else {
         return Ok(());
     };
-    let tag = etag(class);
+    let version = version(class);
+    let same = |one: &str| {
+        let tag = one.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+        one == "*"
+            || tag
+                .and_then(|t| t.rsplit_once('-'))
+                .is_some_and(|(v, _)| v == version)
+    };
     let matches = wanted
         .to_str()
-        .is_ok_and(|list| list.split(',').any(|one| one.trim() == "*" || one.trim() == tag));
+        .is_ok_and(|list| list.split(',').any(|one| same(one.trim())));
     if matches {
         Ok(())
     } else {
@@ -181,7 +233,7 @@ fn check_match(headers: &HeaderMap, class: &Class) -> Result<(), Problem> {
             Code::RevisionMismatch,
             "the class has changed since it was read; read it again",
         )
-        .with("etag", tag))
+        .with("revision", class.revision))
     }
 }
 

@@ -2,20 +2,23 @@
 
 use super::classes::{find_class, insert};
 use crate::http::AppState;
+use crate::http::auth::Caller;
 use crate::http::dto::job::{JobDto, ScopeDto, StartReindex};
 use crate::http::dto::{Page, PageQuery};
 use crate::http::extract::{ApiPath, ApiQuery, OptionalJson};
 use crate::http::problem::{Code, Problem};
 use crate::http::state::Parts;
-use crate::model::{Job, JobId, JobKind, ReindexScope};
+use crate::jobs::JobError;
+use crate::model::{ContentHash, Job, JobId, JobKind, ReindexScope};
 use crate::parameters::Parameters;
 use axum::Json;
 use axum::extract::State;
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use futures_util::{Stream, StreamExt, stream};
 use std::convert::Infallible;
+use std::sync::PoisonError;
 use tokio_stream::wrappers::WatchStream;
 
 /// Start a reindex
@@ -24,6 +27,8 @@ use tokio_stream::wrappers::WatchStream;
 /// Queries go on against the old one meanwhile. The answer is a job to follow.
 #[utoipa::path(
     post, path = "/v1/reindex", tag = "jobs",
+    params(("idempotency-key" = Option<String>, Header, description = "1 to 200 visible characters of the client's \
+            choice. The same key with the same body within 24 hours gets the same job")),
     request_body(content = StartReindex, description = "May be left out"),
     responses((status = 202, description = "The job", body = JobDto, headers(
         ("location" = String, description = "Where the job is"),
@@ -31,10 +36,25 @@ use tokio_stream::wrappers::WatchStream;
 )]
 pub async fn start_reindex(
     State(state): State<AppState>,
+    caller: Caller,
+    headers: HeaderMap,
     OptionalJson(body): OptionalJson<StartReindex>,
 ) -> Result<Response, Problem> {
+    let answers = match idempotency_key(&headers, &caller)? {
+        Some(key) => Some((
+            key,
+            ContentHash::of(&serde_json::to_vec(&body).map_err(Problem::internal)?),
+        )),
+        None => None,
+    };
     let job = state
         .blocking(move |s| {
+            let _alone = s.catalogue.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some((key, request)) = answers
+                && let Some(job) = started_before(s, key, request)?
+            {
+                return Ok(job);
+            }
             let kind = JobKind::Reindex {
                 parameters: parameters(s, &body)?,
                 scope: scope(s, body.scope)?,
@@ -47,13 +67,49 @@ pub async fn start_reindex(
                     "no class has a shape yet; POST meshes to /v1/classes/{class}/shapes first",
                 ));
             }
-            Ok(s.jobs.enqueue(kind)?)
+            Ok(s.jobs.enqueue_answering(kind, answers)?)
         })
         .await?;
     let location = format!("/v1/jobs/{}", job.id);
     let mut response = (StatusCode::ACCEPTED, Json(JobDto::from(job))).into_response();
     insert(&mut response, header::LOCATION, &location);
     Ok(response)
+}
+
+/// The client's key, made one with who it is: two callers may choose the same.
+fn idempotency_key(headers: &HeaderMap, caller: &Caller) -> Result<Option<ContentHash>, Problem> {
+    let Some(value) = headers.get("idempotency-key") else {
+        return Ok(None);
+    };
+    let bytes = value.as_bytes();
+    if !(1..=200).contains(&bytes.len()) || !bytes.iter().all(u8::is_ascii_graphic) {
+        return Err(Problem::new(
+            Code::InvalidRequest,
+            "an idempotency-key has 1 to 200 visible ASCII characters",
+        )
+        .with("name", "idempotency-key"));
+    }
+    let who = caller.key.as_ref().map_or([0; 16], |key| key.id.to_bytes());
+    Ok(Some(ContentHash::of(&[&who[..], bytes].concat())))
+}
+
+/// The job this key started before, where it is still known.
+fn started_before(parts: &Parts, key: ContentHash, request: ContentHash) -> Result<Option<Job>, Problem> {
+    let Some(known) = parts.store.remembered(key, jiff::Timestamp::now())? else {
+        return Ok(None);
+    };
+    if known.request != request {
+        return Err(Problem::new(
+            Code::IdempotencyKeyReused,
+            "this idempotency-key started another job with another body; take a new key",
+        )
+        .with("job", known.job.to_string()));
+    }
+    match parts.jobs.job(known.job) {
+        Ok(job) => Ok(Some(job)),
+        Err(JobError::NoJob { .. }) => Ok(None),
+        Err(other) => Err(other.into()),
+    }
 }
 
 /// `None` where nothing was asked for and there is an index whose parameters can stay.

@@ -3,11 +3,14 @@
 use crate::http::AppState;
 use crate::http::admission::Patience;
 use crate::http::answer::answer;
+use crate::http::auth::Caller;
 use crate::http::dto::query::{BatchLine, BatchSummary, QueryAnswer, QueryOptions};
 use crate::http::dto::{Binary, FilesForm};
 use crate::http::extract::ApiQuery;
+use crate::http::limits::Allowance;
 use crate::http::problem::{Code, Problem};
 use crate::http::problem_from::index_empty;
+use crate::http::time_limit::TimeLimit;
 use crate::http::upload::{self, Upload};
 use crate::http::uploaded::UploadedMesh;
 use crate::http::{metrics, respond};
@@ -21,6 +24,7 @@ use bytes::Bytes;
 use futures_util::{StreamExt, stream};
 use std::convert::Infallible;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Query with a mesh
 ///
@@ -41,13 +45,17 @@ use std::sync::Arc;
 pub async fn query_mesh(
     State(state): State<AppState>,
     ApiQuery(options): ApiQuery<QueryOptions>,
+    caller: Caller,
     request: Request,
-) -> Result<Json<QueryAnswer>, Problem> {
-    let (live, upload) = begin(&state, &options, request).await?;
+) -> Result<Response, Problem> {
+    let (live, upload, left) = begin(&state, &caller, &options, request).await?;
     let mesh = upload::only_mesh(upload)?;
-    rank(&state, Patience::Bounded, live, mesh, options)
-        .await
-        .map(Json)
+    let answer = rank(&state, Patience::Bounded, live, mesh, options).await?;
+    let mut response = Json(answer).into_response();
+    if let Some(left) = left {
+        left.tell(&mut response);
+    }
+    Ok(response)
 }
 
 /// Query with many meshes
@@ -69,11 +77,15 @@ pub async fn query_mesh(
 pub async fn query_batch(
     State(state): State<AppState>,
     ApiQuery(options): ApiQuery<QueryOptions>,
+    caller: Caller,
     request: Request,
 ) -> Result<Response, Problem> {
     let id = respond::id_of(&request);
-    let (live, upload) = begin(&state, &options, request).await?;
+    let (live, upload, mut left) = begin(&state, &caller, &options, request).await?;
     let total = upload.meshes.len();
+    if total > 1 {
+        left = state.limits.take_queries(&caller, total - 1)?;
+    }
     let threads = state.config.query_threads.max(1);
     let stopping = state.stopping.clone();
     let lines = stream::iter(upload.meshes.into_iter().enumerate())
@@ -128,11 +140,12 @@ pub async fn query_batch(
             }
         },
     );
-    Ok((
-        [(header::CONTENT_TYPE, "application/x-ndjson")],
-        Body::from_stream(body),
-    )
-        .into_response())
+    let kind = [(header::CONTENT_TYPE, "application/x-ndjson")];
+    let mut response = (kind, Body::from_stream(body)).into_response();
+    if let Some(left) = left {
+        left.tell(&mut response);
+    }
+    Ok(response)
 }
 
 fn line_of(line: &BatchLine) -> Result<Bytes, Infallible> {
@@ -142,15 +155,24 @@ fn line_of(line: &BatchLine) -> Result<Bytes, Infallible> {
     Ok(text.into())
 }
 
-/// The index the request is answered from, whatever is switched in meanwhile, and what it brought.
+/// The index the request is answered from, whatever is switched in meanwhile, what it brought, and what is left of
+/// its key's queries. The first query is taken off before the body is read.
 async fn begin(
     state: &AppState,
+    caller: &Caller,
     options: &QueryOptions,
     request: Request,
-) -> Result<(Arc<LiveIndex>, Upload), Problem> {
-    if options.top == Some(0) {
-        return Err(Problem::new(Code::InvalidQuery, "top must be 1 or more, got 0").with("name", "top"));
+) -> Result<(Arc<LiveIndex>, Upload, Option<Allowance>), Problem> {
+    for (name, value) in [
+        ("top", options.top.map(|top| top as u64)),
+        ("time_limit_ms", options.time_limit_ms),
+    ] {
+        if value == Some(0) {
+            let detail = format!("{name} must be 1 or more, got 0");
+            return Err(Problem::new(Code::InvalidQuery, detail).with("name", name));
+        }
     }
+    let left = state.limits.take_queries(caller, 1)?;
     let upload = upload::receive(
         request,
         options.name.clone(),
@@ -162,7 +184,7 @@ async fn begin(
     if live.index.classes.is_empty() {
         return Err(index_empty());
     }
-    Ok((live, upload))
+    Ok((live, upload, left))
 }
 
 async fn rank(
@@ -173,10 +195,24 @@ async fn rank(
     options: QueryOptions,
 ) -> Result<QueryAnswer, Problem> {
     let shared = state.clone();
-    state
+    let name = mesh.name.clone();
+    let limit = options
+        .time_limit_ms
+        .map(|milliseconds| TimeLimit::start(Duration::from_millis(milliseconds)));
+    let view = limit.as_ref().map(TimeLimit::view);
+    let answered = state
         .compute
         .run(patience, state.config.query_timeout, move |work| {
-            answer(&shared, &live, &mesh, &options, work)
+            answer(&shared, &live, &mesh, &options, view.as_ref(), work)
         })
-        .await
+        .await;
+    drop(limit);
+    if let (Ok(answer), Some(slow)) = (&answered, state.config.slow_query) {
+        let total = answer.timings_ms.get("total").copied().unwrap_or_default();
+        if total >= slow.as_secs_f64() * 1e3 {
+            let timings = serde_json::to_string(&answer.timings_ms).unwrap_or_default();
+            tracing::warn!(target: "shapelex::slow_query", name, milliseconds = total, timings, "slow query");
+        }
+    }
+    answered
 }

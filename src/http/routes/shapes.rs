@@ -1,12 +1,14 @@
 //! Training shapes: uploaded, listed, shown, deleted, downloaded.
 
-use super::classes::{find_class, insert};
+use super::classes::{find_class, insert, is_at_hand};
 use crate::http::AppState;
 use crate::http::admission::Patience;
+use crate::http::auth::Caller;
 use crate::http::dto::class::ClassDto;
 use crate::http::dto::shape::{ShapeDto, UploadQuery, UploadResult};
 use crate::http::dto::{Binary, FilesForm, Page, PageQuery};
 use crate::http::extract::{ApiPath, ApiQuery};
+use crate::http::limits;
 use crate::http::problem::{Code, Problem};
 use crate::http::state::Parts;
 use crate::http::upload;
@@ -55,6 +57,7 @@ pub async fn create_shapes(
     State(state): State<AppState>,
     ApiPath(class): ApiPath<String>,
     ApiQuery(query): ApiQuery<UploadQuery>,
+    caller: Caller,
     request: Request,
 ) -> Result<Response, Problem> {
     let create = query.create.unwrap_or(false);
@@ -78,7 +81,9 @@ pub async fn create_shapes(
     )
     .await?;
     let shapes = check_all(&state, upload.meshes, query.poses, options).await?;
-    let (class, added) = state.blocking(move |s| store(s, &class, create, shapes)).await?;
+    let (class, added) = state
+        .blocking(move |s| store(s, &caller, &class, create, shapes))
+        .await?;
     let status = if added.iter().any(|a| a.created) {
         StatusCode::CREATED
     } else {
@@ -207,21 +212,28 @@ fn check_one(
 
 fn store(
     parts: &Parts,
+    caller: &Caller,
     class: &str,
     create: bool,
     shapes: Vec<NewShape>,
 ) -> Result<(Class, Vec<AddedShape>), Problem> {
     let _alone = parts.catalogue.lock().unwrap_or_else(PoisonError::into_inner);
+    let bytes = |s: &NewShape| s.bytes.len() + s.companions.iter().map(|c| c.bytes.len()).sum::<usize>();
+    let bytes = shapes.iter().map(bytes).sum::<usize>() as u64;
+    parts.limits.check_quota(parts, caller, 0, bytes)?;
     let found = match find_class(&parts.store, class) {
         Err(problem) if create && problem.code == Code::ClassNotFound => {
+            parts.limits.check_quota(parts, caller, 1, 0)?;
             let added = parts.store.create_filled_class(ClassName::new(class)?, shapes)?;
             // A mesh was sent, else the upload had been refused, so there is a shape that names its class.
             let made = added.first().map(|a| a.shape.class).ok_or(problem)?;
+            limits::note(parts, caller, Some(made), &added);
             return Ok((parts.store.class(made)?, added));
         }
         found => found?,
     };
     let added = parts.store.add_shapes(found.id, shapes)?;
+    limits::note(parts, caller, None, &added);
     Ok((parts.store.class(found.id)?, added))
 }
 
@@ -331,15 +343,7 @@ pub async fn get_original(
         })
         .await?;
     let tag = format!("\"{}\"", shape.content);
-    let at_hand = headers
-        .get(header::IF_NONE_MATCH)
-        .and_then(|v| v.to_str().ok())
-        .is_some_and(|list| {
-            list.split(',')
-                .map(|one| one.trim().trim_start_matches("W/"))
-                .any(|one| one == "*" || one == tag)
-        });
-    let mut response = if at_hand {
+    let mut response = if is_at_hand(&headers, &tag) {
         StatusCode::NOT_MODIFIED.into_response()
     } else {
         let missing = |e: std::io::Error| {

@@ -1,0 +1,109 @@
+//! HTTPS by the service itself, where it was built with the feature `tls`.
+
+use super::config::ServiceConfig;
+use super::serve::Connections;
+use axum_server::Server;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Why there is no HTTPS.
+#[derive(Debug, thiserror::Error)]
+pub enum TlsError {
+    /// This build cannot.
+    #[error(
+        "this shapelex was built without TLS; build it with `--features tls`, or put a proxy with TLS in front"
+    )]
+    NotBuilt,
+    /// One file without the other.
+    #[error("TLS needs both a certificate (--tls-cert) and its key (--tls-key)")]
+    Incomplete,
+    /// A file cannot be used.
+    #[error("{}: {reason}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+}
+
+/// How connections are secured.
+pub(super) enum Tls {
+    /// Not at all.
+    Off,
+    /// With this certificate.
+    #[cfg(feature = "tls")]
+    On(axum_server::tls_rustls::RustlsConfig),
+}
+
+impl Tls {
+    /// Reads the certificate chain and the key, both PEM.
+    ///
+    /// # Errors
+    /// [`TlsError`].
+    pub fn load(config: &ServiceConfig) -> Result<Self, TlsError> {
+        match (&config.tls_cert, &config.tls_key) {
+            (None, None) => Ok(Self::Off),
+            (Some(certificate), Some(key)) => Self::read(certificate.clone(), key.clone()),
+            _ => Err(TlsError::Incomplete),
+        }
+    }
+
+    #[cfg(not(feature = "tls"))]
+    fn read(_: PathBuf, _: PathBuf) -> Result<Self, TlsError> {
+        Err(TlsError::NotBuilt)
+    }
+
+    #[cfg(feature = "tls")]
+    fn read(certificate: PathBuf, key: PathBuf) -> Result<Self, TlsError> {
+        use rustls::ServerConfig;
+        use rustls::crypto::ring;
+        use rustls::pki_types::pem::PemObject;
+        use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+        use std::sync::Arc;
+
+        let fail = |path: &PathBuf, reason: String| TlsError::File {
+            path: path.clone(),
+            reason,
+        };
+        let chain = CertificateDer::pem_file_iter(&certificate)
+            .and_then(Iterator::collect::<Result<Vec<_>, _>>)
+            .map_err(|e| fail(&certificate, e.to_string()))?;
+        if chain.is_empty() {
+            return Err(fail(&certificate, "there is no certificate in it".to_owned()));
+        }
+        let private = PrivateKeyDer::from_pem_file(&key).map_err(|e| fail(&key, e.to_string()))?;
+        let mut server = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
+            .with_safe_default_protocol_versions()
+            .map_err(|e| fail(&certificate, e.to_string()))?
+            .with_no_client_auth()
+            .with_single_cert(chain, private)
+            .map_err(|e| fail(&key, e.to_string()))?;
+        server.alpn_protocols = vec![b"http/1.1".to_vec()];
+        Ok(Self::On(axum_server::tls_rustls::RustlsConfig::from_config(
+            Arc::new(server),
+        )))
+    }
+
+    /// Accepts connections until the server's handle is told to stop.
+    ///
+    /// # Errors
+    /// Where the listener fails.
+    pub async fn serve(
+        self,
+        server: Server<SocketAddr>,
+        connections: Connections,
+        #[cfg_attr(not(feature = "tls"), allow(unused_variables))] handshake: Duration,
+    ) -> std::io::Result<()> {
+        match self {
+            Self::Off => server.serve(connections).await,
+            #[cfg(feature = "tls")]
+            Self::On(config) => {
+                let acceptor =
+                    axum_server::tls_rustls::RustlsAcceptor::new(config).handshake_timeout(handshake);
+                server.acceptor(acceptor).serve(connections).await
+            }
+        }
+    }
+}
