@@ -84,7 +84,8 @@ fn unpack_zip(bytes: &[u8], limits: &ArchiveLimits) -> Result<Vec<Member>, Probl
         let file = file.map_err(broken)?;
         let path = file.name().map_err(broken)?.into_owned();
         if file.is_file() {
-            collected.take(&path, file)?;
+            let declared = file.size();
+            collected.take(&path, declared, file)?;
         } else {
             collected.count()?;
         }
@@ -99,7 +100,8 @@ fn unpack_tar(reader: impl Read, limits: &ArchiveLimits) -> Result<Vec<Member>, 
         let entry = entry.map_err(|e| broken("tar", e))?;
         if entry.header().entry_type().is_file() {
             let path = String::from_utf8_lossy(&entry.path_bytes()).into_owned();
-            collected.take(&path, entry)?;
+            let declared = entry.size();
+            collected.take(&path, declared, entry)?;
         } else {
             collected.count()?;
         }
@@ -147,31 +149,41 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
+    fn too_large(&self) -> Problem {
+        Problem::new(
+            Code::ArchiveTooLarge,
+            format!("the archive unpacks to more than {} bytes", self.limits.max_bytes),
+        )
+        .with("limit_bytes", self.limits.max_bytes)
+    }
+
     fn count(&mut self) -> Result<(), Problem> {
         self.seen += 1;
         self.check_count(self.seen)
     }
 
-    fn take(&mut self, path: &str, mut reader: impl Read) -> Result<(), Problem> {
+    /// Adds a file. Its declared size can refuse it before anything is unpacked, but never let it in.
+    fn take(&mut self, path: &str, declared: u64, mut reader: impl Read) -> Result<(), Problem> {
         self.count()?;
         let path = safe_path(path)?;
         if is_clutter(&path) {
             return Ok(());
         }
         let left = self.limits.max_bytes - self.bytes;
-        let mut bytes = Vec::new();
+        if declared > left as u64 {
+            return Err(self.too_large());
+        }
+        // Room for what is promised, so that growing does not hold a file twice; pages nobody writes to cost nothing.
+        let mut bytes = Vec::with_capacity(usize::try_from(declared).unwrap_or(0));
         reader
             .by_ref()
             .take(left as u64 + 1)
             .read_to_end(&mut bytes)
             .map_err(|e| broken("archive", format!("{path}: {e}")))?;
         if bytes.len() > left {
-            return Err(Problem::new(
-                Code::ArchiveTooLarge,
-                format!("the archive unpacks to more than {} bytes", self.limits.max_bytes),
-            )
-            .with("limit_bytes", self.limits.max_bytes));
+            return Err(self.too_large());
         }
+        bytes.shrink_to_fit();
         if detect(&bytes).is_some() {
             return Err(Problem::new(
                 Code::NestedArchive,

@@ -45,3 +45,19 @@ fn decode<R: Record>(version: u16, payload: &[u8]) {
         assert!(read.is_ok(), "a record that was written is not read again");
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    #[test]
+    fn the_corpus_is_decoded_or_refused() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/record");
+        let mut inputs = 0;
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            super::check(&std::fs::read(entry.unwrap().path()).unwrap());
+            inputs += 1;
+        }
+        assert!(inputs >= 20, "{inputs} inputs in {}", folder.display());
+    }
+}

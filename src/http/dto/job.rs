@@ -35,6 +35,18 @@ pub struct StartReindex {
     pub parameters: Option<ParameterOverrides>,
 }
 
+/// An event of a job's stream.
+#[derive(ToSchema)]
+#[allow(dead_code, reason = "only its schema is used; the events are written by axum")]
+pub struct JobEvent {
+    /// `progress`.
+    pub event: String,
+    /// The job's id.
+    pub id: String,
+    /// The job as JSON text, see `JobDto`.
+    pub data: String,
+}
+
 /// One step of a job.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, ToSchema)]
 pub struct StepDto {

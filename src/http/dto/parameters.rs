@@ -238,6 +238,7 @@ parameter_set! {
     /// Whether every training shape gets a dictionary of its own too.
     per_shape: bool;
     /// Seed of everything that is random.
+    #[schema(format = "uint64")]
     seed: u64;
 }
 

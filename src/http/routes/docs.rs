@@ -42,7 +42,7 @@ pub async fn get_docs() -> impl IntoResponse {
 /// The API, as OpenAPI in YAML
 #[utoipa::path(
     get, path = "/openapi.yaml", tag = "documents",
-    responses((status = 200, description = "YAML", body = String, content_type = "application/yaml"))
+    responses((status = 200, description = "YAML", body = Object, content_type = "application/yaml"))
 )]
 pub async fn get_openapi_yaml(State(state): State<AppState>) -> impl IntoResponse {
     (

@@ -3,7 +3,7 @@
 use super::classes::{find_class, insert};
 use crate::http::AppState;
 use crate::http::auth::Caller;
-use crate::http::dto::job::{JobDto, ScopeDto, StartReindex};
+use crate::http::dto::job::{JobDto, JobEvent, ScopeDto, StartReindex};
 use crate::http::dto::{Page, PageQuery};
 use crate::http::extract::{ApiPath, ApiQuery, OptionalJson};
 use crate::http::problem::{Code, Problem};
@@ -29,7 +29,7 @@ use tokio_stream::wrappers::WatchStream;
     post, path = "/v1/reindex", tag = "jobs",
     params(("idempotency-key" = Option<String>, Header, description = "1 to 200 visible characters of the client's \
             choice. The same key with the same body within 24 hours gets the same job")),
-    request_body(content = StartReindex, description = "May be left out"),
+    request_body(content = Option<StartReindex>, description = "May be left out"),
     responses((status = 202, description = "The job", body = JobDto, headers(
         ("location" = String, description = "Where the job is"),
     )))
@@ -215,7 +215,7 @@ pub async fn cancel_job(
 #[utoipa::path(
     get, path = "/v1/jobs/{job}/events", tag = "jobs",
     params(("job" = String, Path, description = "The job's id")),
-    responses((status = 200, description = "Events", body = String, content_type = "text/event-stream"))
+    responses((status = 200, description = "Events", body = JobEvent, content_type = "text/event-stream"))
 )]
 pub async fn follow_job(
     State(state): State<AppState>,

@@ -1,0 +1,102 @@
+//! Small requests that ask for much: each is answered with a precise problem, within 5 s, by a process that stays
+//! below 512 MB.
+
+#[allow(dead_code, reason = "shared with tests/service")]
+#[path = "../service/harness.rs"]
+mod harness;
+#[allow(dead_code, reason = "shared with tests/service")]
+#[path = "../service/meshes.rs"]
+mod meshes;
+
+mod archives;
+mod surfaces;
+
+use harness::{App, small};
+use serde_json::json;
+use std::time::{Duration, Instant};
+
+const LIMIT: Duration = Duration::from_secs(5);
+const MEMORY: usize = 512 << 20;
+
+/// What is sent, as what, and the status and code it is answered with.
+type Case = (&'static str, &'static str, Vec<u8>, u16, &'static str);
+
+/// The process's largest resident set since it was last reset, in bytes; `None` where the system does not say.
+fn peak() -> Option<usize> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    let kilobytes: usize = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kilobytes << 10)
+}
+
+/// Sends a case as a query and returns what is wrong with the answer.
+async fn attempt(app: &App, (what, media_type, body, status, code): Case) -> Option<String> {
+    // Linux starts counting the peak anew.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+    let began = Instant::now();
+    let answer = app.post("/v1/query", media_type, body).await;
+    let took = began.elapsed();
+    let peak = peak().unwrap_or(0);
+    println!(
+        "{what}: {} {}, {:.2} s, peak {} MB",
+        answer.status,
+        answer.text().chars().take(120).collect::<String>(),
+        took.as_secs_f64(),
+        peak >> 20
+    );
+    let found = answer.problem();
+    if found != (status, code.to_owned()) {
+        return Some(format!(
+            "{what}: {found:?}, expected {status} {code}: {}",
+            answer.text()
+        ));
+    }
+    if took > LIMIT || peak > MEMORY {
+        return Some(format!("{what}: {took:?}, {} MB", peak >> 20));
+    }
+    None
+}
+
+// One test, so that the memory of one case is not counted for another.
+#[tokio::test(flavor = "multi_thread")]
+async fn each_is_answered_with_its_problem() {
+    let app = App::indexed().await;
+    let makers: Vec<fn() -> Case> = [archives::CASES, surfaces::CASES].concat();
+    let mut wrong = Vec::new();
+    for make in makers {
+        wrong.extend(attempt(&app, make()).await);
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+
+    for (name, body) in surfaces::answerable() {
+        let began = Instant::now();
+        let answer = app.post("/v1/query", "application/octet-stream", body).await;
+        assert_eq!(answer.status, 200, "{name}: {}", answer.text());
+        assert!(began.elapsed() < LIMIT, "{name}: {:?}", began.elapsed());
+    }
+
+    let nested = format!("{{\"name\": {}{}}}", "[".repeat(100_000), "]".repeat(100_000));
+    let answer = app.post("/v1/classes", "application/json", nested).await;
+    answer.fails(400, "invalid_json");
+
+    many_equal_pieces(&app).await;
+}
+
+/// More equal pieces than the solver's blocks find copies of an eigenvalue, in a mesh too large for the dense one.
+async fn many_equal_pieces(app: &App) {
+    let mut parameters = small();
+    for (key, value) in [
+        ("components", json!("all")),
+        ("working_size", json!(0)),
+        ("eigenpairs", json!(120)),
+    ] {
+        parameters[key] = value;
+    }
+    let job = app.reindex(json!({"parameters": parameters})).await;
+    assert_eq!(job["state"], "succeeded", "{job}");
+    let began = Instant::now();
+    let answer = app.post("/v1/query", "model/off", surfaces::pieces(40)).await;
+    assert_eq!(answer.status, 200, "{}", answer.text());
+    assert_eq!(answer.value()["mesh"]["components"], 40);
+    assert!(began.elapsed() < LIMIT, "{:?}", began.elapsed());
+}
