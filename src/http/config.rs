@@ -47,6 +47,12 @@ pub struct ServiceConfig {
     pub job_queue: usize,
     /// What the first reindex starts from, where it names no preset.
     pub preset: Preset,
+    /// How often a snapshot is made by itself; `None` for never.
+    pub snapshot_every: Option<Duration>,
+    /// Snapshots made by themselves that are kept.
+    pub snapshot_keep: usize,
+    /// Bytes of a snapshot that is restored, packed and unpacked, at most.
+    pub snapshot_max_bytes: u64,
     /// How long running work may go on when the service is asked to stop.
     pub shutdown_timeout: Duration,
 }
@@ -75,6 +81,9 @@ impl Default for ServiceConfig {
             indexing_threads: jobs.indexing_threads,
             job_queue: jobs.queue_limit,
             preset: Preset::Default,
+            snapshot_every: None,
+            snapshot_keep: 7,
+            snapshot_max_bytes: 16 << 30,
             shutdown_timeout: Duration::from_secs(10),
         }
     }

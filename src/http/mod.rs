@@ -10,6 +10,7 @@ pub mod auth;
 pub mod config;
 pub mod dto;
 pub mod extract;
+mod housekeeping;
 pub mod keyring;
 pub mod metrics;
 pub mod openapi;

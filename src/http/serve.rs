@@ -1,5 +1,6 @@
 //! From settings to a listening service, and back down in good order.
 
+use super::housekeeping;
 use super::router::router;
 use super::state::{AppState, OpenError};
 use std::future::{Future, IntoFuture};
@@ -26,6 +27,7 @@ pub async fn serve(
     listener: TcpListener,
     shutdown: impl Future<Output = ()> + Send + 'static,
 ) -> Result<(), ServeError> {
+    tokio::spawn(housekeeping::run(state.clone()));
     let stopping = state.stopping.clone();
     let stop = stopping.clone();
     let server = axum::serve(listener, router(state.clone())).with_graceful_shutdown(async move {

@@ -5,6 +5,7 @@ mod catalogue;
 mod faults;
 mod jobs;
 mod recovery;
+mod snapshots;
 
 use bytes::Bytes;
 use shapelex::mesh::{Format, PrepareReport};
