@@ -28,7 +28,7 @@ fn records_cost_a_bounded_multiple_of_their_size_in_memory() {
         for i in 0..dictionaries {
             // Of the default size: 128 atoms of 100 numbers.
             let mut atoms = Mat::from_fn(100, 128, |r, c| ((r * 31 + c * 17 + i * 7) % 101) as f64 + 1.0);
-            for mut atom in atoms.col_iter_mut() {
+            for atom in atoms.col_iter_mut() {
                 let norm = atom.norm_l2();
                 atom.iter_mut().for_each(|x| *x /= norm);
             }

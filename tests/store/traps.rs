@@ -39,7 +39,7 @@ fn overwriting_does_not_grow_the_directory_without_end() {
         let mut atoms = Mat::from_fn(100, 128, |r, c| {
             ((r * 31 + c * 17) as u64 + round) as f64 % 101.0 + 1.0
         });
-        for mut atom in atoms.col_iter_mut() {
+        for atom in atoms.col_iter_mut() {
             let norm = atom.norm_l2();
             atom.iter_mut().for_each(|x| *x /= norm);
         }
