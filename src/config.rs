@@ -140,6 +140,8 @@ settings! {
     max_faces: usize = 4_000_000, "SHAPELEX_MAX_FACES", "COUNT";
     /// Poses sampled from one animated file, at most
     max_poses: usize = 64, "SHAPELEX_MAX_POSES", "COUNT";
+    /// Memory that requests may take for computing, all together, in MiB; a mesh that would take more is refused
+    memory_mib: u64 = 2048, "SHAPELEX_MEMORY_MIB", "MIB";
     /// Threads that answer queries; 0 takes one per core
     query_threads: usize = 0, "SHAPELEX_QUERY_THREADS", "COUNT";
     /// Queries that may wait for a thread before more are refused
@@ -156,6 +158,12 @@ settings! {
     job_queue: usize = 1000, "SHAPELEX_JOB_QUEUE", "COUNT";
     /// Time running requests get to finish at shutdown, in seconds
     shutdown_timeout_seconds: u64 = 10, "SHAPELEX_SHUTDOWN_TIMEOUT_SECONDS", "SECONDS";
+    /// Time between snapshots made by themselves, in minutes; 0 makes none
+    snapshot_every_minutes: u64 = 0, "SHAPELEX_SNAPSHOT_EVERY_MINUTES", "MINUTES";
+    /// Snapshots made by themselves that are kept; older ones are removed
+    snapshot_keep: usize = 7, "SHAPELEX_SNAPSHOT_KEEP", "COUNT";
+    /// Size of a snapshot that is restored, packed and unpacked, at most, in MiB
+    snapshot_max_mib: u64 = 16_384, "SHAPELEX_SNAPSHOT_MAX_MIB", "MIB";
     /// Page cache of the key-value store, in MiB
     cache_mib: u64 = 64, "SHAPELEX_CACHE_MIB", "MIB";
 }
@@ -213,18 +221,21 @@ fn one_line(error: &toml::de::Error, text: &str) -> String {
 
 impl Config {
     fn validate(&self) -> Result<(), ConfigError> {
-        let at_least_one: [(&'static str, u64); 14] = [
+        let at_least_one: [(&'static str, u64); 17] = [
             ("max_body_mib", self.max_body_mib as u64),
             ("max_upload_files", self.max_upload_files as u64),
             ("max_unpacked_mib", self.max_unpacked_mib as u64),
             ("max_vertices", self.max_vertices as u64),
             ("max_faces", self.max_faces as u64),
             ("max_poses", self.max_poses as u64),
+            ("memory_mib", self.memory_mib),
             ("query_queue", self.query_queue as u64),
             ("query_wait_seconds", self.query_wait_seconds),
             ("query_timeout_seconds", self.query_timeout_seconds),
             ("upload_timeout_seconds", self.upload_timeout_seconds),
             ("job_queue", self.job_queue as u64),
+            ("snapshot_keep", self.snapshot_keep as u64),
+            ("snapshot_max_mib", self.snapshot_max_mib),
             ("cache_mib", self.cache_mib),
             ("max_connections", self.max_connections as u64),
             ("header_timeout_seconds", self.header_timeout_seconds),
@@ -286,6 +297,7 @@ impl Config {
                 max_poses: self.max_poses,
                 ..Limits::default()
             },
+            memory_bytes: self.memory_mib << 20,
             query_threads: or_default(self.query_threads, default.query_threads),
             query_queue: self.query_queue,
             query_wait: Duration::from_secs(self.query_wait_seconds),
@@ -294,6 +306,10 @@ impl Config {
             indexing_threads: or_default(self.indexing_threads, default.indexing_threads),
             job_queue: self.job_queue,
             preset: self.preset,
+            snapshot_every: (self.snapshot_every_minutes > 0)
+                .then(|| Duration::from_secs(60 * self.snapshot_every_minutes)),
+            snapshot_keep: self.snapshot_keep,
+            snapshot_max_bytes: self.snapshot_max_mib << 20,
             shutdown_timeout: Duration::from_secs(self.shutdown_timeout_seconds),
         }
     }

@@ -3,9 +3,9 @@
 pub mod deform;
 pub mod evaluate;
 pub mod measures;
-pub mod open_set;
 pub mod method;
 pub mod nearest;
+pub mod open_set;
 pub mod paper;
 pub mod protocol;
 pub mod report;
@@ -16,8 +16,8 @@ pub mod unit;
 
 pub use evaluate::{Evaluation, LabelledShape, QueryResult, evaluate};
 pub use measures::RetrievalMeasures;
-pub use open_set::{OpenSet, Share, evaluate_open_set};
 pub use method::Method;
+pub use open_set::{OpenSet, Share, evaluate_open_set};
 pub use protocol::{Protocol, Round, rounds};
 pub use report::BenchmarkReport;
 pub use robustness::{Category, Member, Robustness, robustness_rounds};

@@ -93,7 +93,7 @@ impl Specimen {
             } else {
                 let store = |views: Vec<View>| views.iter().map(StoredView::of).collect();
                 Seen::Views {
-                    training: store(shape.training_views(parameters, cancel)?),
+                    training: store(shape.training_views(parameters)?),
                     query: store(shape.query_views(parameters, cancel)?),
                 }
             });

@@ -82,9 +82,9 @@ impl From<CallError> for CliError {
 }
 
 /// A service to talk to.
-pub struct Client(Transport);
+pub struct Client(pub(super) Transport);
 
-enum Transport {
+pub(super) enum Transport {
     Remote {
         agent: ureq::Agent,
         base: String,
@@ -176,15 +176,7 @@ impl Client {
             Payload::Bytes(content_type, bytes) => (Some(content_type), bytes),
         };
         let (status, bytes) = self.send(method, path, content_type, body)?;
-        let value = serde_json::from_slice(&bytes).unwrap_or(Value::Null);
-        if (200..300).contains(&status) {
-            return Ok(value);
-        }
-        let text = |name: &str| value.get(name).and_then(Value::as_str).map(str::to_owned);
-        Err(CallError::Refused {
-            code: text("code").unwrap_or_else(|| status.to_string()),
-            detail: text("detail").unwrap_or_else(|| format!("the service answered with status {status}")),
-        })
+        outcome(status, &bytes)
     }
 
     fn send(
@@ -242,6 +234,19 @@ impl Client {
             }
         }
     }
+}
+
+/// An answer's JSON, or why there is none.
+pub(super) fn outcome(status: u16, bytes: &[u8]) -> Result<Value, CallError> {
+    let value = serde_json::from_slice(bytes).unwrap_or(Value::Null);
+    if (200..300).contains(&status) {
+        return Ok(value);
+    }
+    let text = |name: &str| value.get(name).and_then(Value::as_str).map(str::to_owned);
+    Err(CallError::Refused {
+        code: text("code").unwrap_or_else(|| status.to_string()),
+        detail: text("detail").unwrap_or_else(|| format!("the service answered with status {status}")),
+    })
 }
 
 impl Drop for Client {

@@ -33,6 +33,8 @@ pub mod query;
 mod refused;
 pub mod serve;
 mod service;
+pub mod snapshot;
+mod transfer;
 pub mod zoo;
 
 pub use error::CliError;
@@ -85,6 +87,8 @@ pub enum Command {
     Import(import::ImportArgs),
     /// Make, list and revoke API keys
     Keys(keys::KeysArgs),
+    /// Make, list, download and restore snapshots of everything a service holds
+    Snapshot(snapshot::SnapshotArgs),
     /// Ask whether a service answers
     Health(health::HealthArgs),
     /// Print the API's OpenAPI document
@@ -133,6 +137,7 @@ fn dispatch(cli: &Cli) -> Result<(), CliError> {
         Command::Export(args) => export::run(args, json),
         Command::Import(args) => import::run(args, json),
         Command::Keys(args) => keys::run(args, json),
+        Command::Snapshot(args) => snapshot::run(args, json),
         Command::Health(args) => health::run(args, json),
         Command::Openapi => openapi::run(json),
     }

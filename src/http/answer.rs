@@ -10,9 +10,12 @@ use super::state::Parts;
 use super::time_limit::{TimeView, rank_until};
 use super::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
+use crate::mesh::TriangleSoup;
 use crate::model::ClassId;
+use crate::parameters::Parameters;
 use crate::pipeline::{Stage, describe_query, rank};
 use crate::ranking::Index;
+use crate::spectral;
 use crate::store::StoreError;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -43,13 +46,17 @@ pub fn answer(
     let watch = Stopwatch::default();
     let observer = |stage| watch.begin(stage);
     observer(Stage::Read);
+    let reading = state.memory.reserve_reading(mesh.bytes.len())?;
     let (format, soup) = mesh.read(&state.config.limits)?;
+    // Held beside each other, since preparing, which the reading is reserved for, is a part of describing.
+    let _spectrum = state.memory.reserve(spectrum_bytes(&soup, parameters))?;
     let stop = limit.map_or(&work.cancel, |limit| &limit.over);
     let timely = |problem: Problem| match limit {
         Some(limit) if problem.code == Code::Cancelled => limit.nothing_scored(),
         _ => problem,
     };
     let description = describe_query(soup, parameters, stop, &observer).map_err(|e| timely(e.into()))?;
+    drop(reading);
     observer(Stage::Ranking);
     let rank_by = options.rank_by.map_or(parameters.rank_by, Into::into);
     let ranked = match limit {
@@ -114,6 +121,16 @@ pub fn answer(
         parameters: parameters.clone().into(),
         timings_ms: timings(&stages, work.waited, began.elapsed()),
     })
+}
+
+/// Memory the spectrum takes, in bytes, by the size the mesh is simplified to.
+fn spectrum_bytes(soup: &TriangleSoup, parameters: &Parameters) -> u64 {
+    let vertices = match parameters.working_size {
+        0 => soup.vertices.len(),
+        // Simplification may stop above its goal, so some room is left.
+        size => soup.vertices.len().min(size.saturating_mul(2)),
+    };
+    spectral::estimated_bytes(vertices, parameters.eigenpairs) as u64
 }
 
 /// The index without the classes that were deleted since it was learnt, and the names the others have now.

@@ -48,6 +48,8 @@ pub struct ServiceConfig {
     pub max_unpacked_bytes: usize,
     /// What reading one mesh may build at most.
     pub limits: Limits,
+    /// Bytes of memory that requests may take for computing, all together.
+    pub memory_bytes: u64,
     /// Threads that answer queries and check uploads.
     pub query_threads: usize,
     /// Queries that may wait for a thread.
@@ -64,6 +66,12 @@ pub struct ServiceConfig {
     pub job_queue: usize,
     /// What the first reindex starts from, where it names no preset.
     pub preset: Preset,
+    /// How often a snapshot is made by itself; `None` for never.
+    pub snapshot_every: Option<Duration>,
+    /// Snapshots made by themselves that are kept.
+    pub snapshot_keep: usize,
+    /// Bytes of a snapshot that is restored, packed and unpacked, at most.
+    pub snapshot_max_bytes: u64,
     /// How long running work may go on when the service is asked to stop.
     pub shutdown_timeout: Duration,
 }
@@ -92,6 +100,7 @@ impl Default for ServiceConfig {
             max_upload_files: 2048,
             max_unpacked_bytes: 256 << 20,
             limits: Limits::default(),
+            memory_bytes: 2 << 30,
             query_threads: cores,
             query_queue: 64,
             query_wait: Duration::from_secs(10),
@@ -100,6 +109,9 @@ impl Default for ServiceConfig {
             indexing_threads: jobs.indexing_threads,
             job_queue: jobs.queue_limit,
             preset: Preset::Default,
+            snapshot_every: None,
+            snapshot_keep: 7,
+            snapshot_max_bytes: 16 << 30,
             shutdown_timeout: Duration::from_secs(10),
         }
     }

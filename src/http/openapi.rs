@@ -4,7 +4,7 @@
 use super::auth::{Access, access_of};
 use super::dto::problem::ProblemDocument;
 use super::problem::Code;
-use super::routes::{classes, docs, health, index, jobs, keys, query, shapes};
+use super::routes::{classes, docs, health, index, jobs, keys, query, shapes, snapshots};
 use axum::http::Method;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -42,6 +42,8 @@ use utoipa::{Modify, OpenApi};
         query::query_mesh, query::query_batch,
         index::get_index, index::get_parameters,
         keys::create_key, keys::list_keys, keys::revoke_key,
+        snapshots::create_snapshot, snapshots::list_snapshots, snapshots::get_snapshot, snapshots::delete_snapshot,
+        snapshots::get_snapshot_file, snapshots::restore_snapshot, snapshots::restore_upload,
         health::get_liveness, health::get_readiness, health::get_metrics,
         docs::get_page, docs::get_docs, docs::get_openapi_yaml, docs::get_openapi_json,
     ),
@@ -251,6 +253,16 @@ fn problems_of(operation: &str) -> Vec<Code> {
             &[OneMeshExpected, IndexEmpty, IndexIncomplete, RateLimited],
         ]
         .concat(),
+        "create_snapshot" => [WRITE, &[SnapshotRunning]].concat(),
+        "list_snapshots" => vec![InvalidQuery, InvalidCursor],
+        "get_snapshot" | "get_snapshot_file" | "delete_snapshot" => vec![SnapshotNotFound],
+        "restore_snapshot" => [WRITE, RESTORE, &[SnapshotNotFound]].concat(),
+        "restore_upload" => [
+            WRITE,
+            RESTORE,
+            &[EmptyBody, InvalidRequest, RequestTimeout, BodyTooLarge],
+        ]
+        .concat(),
         "query_batch" => [UPLOAD, &[IndexEmpty, RateLimited]].concat(),
         _ => vec![],
     };
@@ -269,6 +281,12 @@ const JSON: &[Code] = &[
     Code::UnsupportedMediaType,
 ];
 const WRITE: &[Code] = &[Code::StoreUnavailable, Code::StorageFull];
+const RESTORE: &[Code] = &[
+    Code::SnapshotRunning,
+    Code::InvalidSnapshot,
+    Code::JobsUnfinished,
+    Code::ShuttingDown,
+];
 const UPLOAD: &[Code] = &[
     Code::InvalidRequest,
     Code::InvalidQuery,

@@ -96,6 +96,11 @@ codes! {
     KeyExists, "key_exists", 409, "An API key of that name exists";
     TooManyKeys, "too_many_keys", 409, "There are as many API keys as there may be";
     LastAdminKey, "last_admin_key", 409, "The last key of scope admin cannot go while there are others";
+    // --- snapshots ---
+    SnapshotNotFound, "snapshot_not_found", 404, "There is no such snapshot";
+    SnapshotRunning, "snapshot_running", 409, "Another snapshot is being made or restored";
+    JobsUnfinished, "jobs_unfinished", 409, "Jobs wait or run, and may not";
+    InvalidSnapshot, "invalid_snapshot", 422, "The snapshot cannot be restored";
     // --- the index ---
     IndexEmpty, "index_empty", 409, "No class is indexed yet";
     NothingToIndex, "nothing_to_index", 409, "There are no shapes to learn from";

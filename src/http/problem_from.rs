@@ -133,10 +133,18 @@ impl From<StoreError> for Problem {
                 .with("name", name.to_string())
                 .with("key", id.to_string()),
             StoreError::TooManyKeys { limit } => Self::new(Code::TooManyKeys, detail).with("limit", limit),
+            StoreError::NoSnapshot { id } => {
+                Self::new(Code::SnapshotNotFound, detail).with("snapshot", id.to_string())
+            }
+            StoreError::SnapshotRunning => {
+                Self::new(Code::SnapshotRunning, detail).with("retry_after_seconds", 10)
+            }
+            StoreError::BadSnapshot { .. } => Self::new(Code::InvalidSnapshot, detail),
             StoreError::Full { .. } => Self::new(
                 Code::StorageFull,
-                "the disk is full; nothing was changed. Free some space and try again",
+                "the disk is full; nothing was changed. Writes are taken again by themselves once there is space",
             )
+            .with("retry_after_seconds", 10)
             .logged(detail),
             StoreError::ReadOnly { .. } => Self::new(
                 Code::StoreUnavailable,
@@ -167,6 +175,8 @@ impl From<JobError> for Problem {
                 Self::new(Code::JobFinished, detail).with("state", state.name())
             }
             JobError::Parameter(e) => e.into(),
+            JobError::Unfinished { jobs } => Self::new(Code::JobsUnfinished, detail).with("jobs", jobs),
+            JobError::Paused => Self::new(Code::StoreUnavailable, detail).with("retry_after_seconds", 5),
             JobError::ShuttingDown => Self::new(Code::ShuttingDown, detail),
             JobError::Store(e) => e.into(),
             JobError::NoWorker { .. } => Self::internal(detail),

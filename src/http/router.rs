@@ -2,7 +2,7 @@
 
 use super::auth::API_KEY;
 use super::respond::{REQUEST_ID, around, panicked, route_not_found};
-use super::routes::{classes, docs, health, index, jobs, keys, query, shapes};
+use super::routes::{classes, docs, health, index, jobs, keys, query, shapes, snapshots};
 use super::state::AppState;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -50,6 +50,20 @@ pub fn router(state: AppState) -> Router {
         .route("/v1/parameters", get(index::get_parameters))
         .route("/v1/keys", get(keys::list_keys).post(keys::create_key))
         .route("/v1/keys/{key}", delete(keys::revoke_key))
+        .route(
+            "/v1/snapshots",
+            get(snapshots::list_snapshots).post(snapshots::create_snapshot),
+        )
+        .route("/v1/snapshots/restore", post(snapshots::restore_upload))
+        .route(
+            "/v1/snapshots/{snapshot}",
+            get(snapshots::get_snapshot).delete(snapshots::delete_snapshot),
+        )
+        .route("/v1/snapshots/{snapshot}/file", get(snapshots::get_snapshot_file))
+        .route(
+            "/v1/snapshots/{snapshot}/restore",
+            post(snapshots::restore_snapshot),
+        )
         .route("/healthz", get(health::get_liveness))
         .route("/readyz", get(health::get_readiness))
         .route("/metrics", get(health::get_metrics))

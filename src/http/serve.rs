@@ -4,6 +4,7 @@
 //! a handshake limit; bodies have theirs in [`super::upload`] and [`super::extract`]. Connections beyond the limit wait
 //! to be served until another one ends.
 
+use super::housekeeping;
 use super::router::router;
 use super::state::{AppState, OpenError};
 use super::tls::{Tls, TlsError};
@@ -44,6 +45,7 @@ pub async fn serve(
     listener: TcpListener,
     shutdown: impl Future<Output = ()> + Send + 'static,
 ) -> Result<(), ServeError> {
+    tokio::spawn(housekeeping::run(state.clone()));
     let tls = Tls::load(&state.config)?;
     let handle = Handle::new();
     let deadline = state.config.shutdown_timeout;

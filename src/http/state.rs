@@ -6,6 +6,7 @@ use super::auth;
 use super::config::ServiceConfig;
 use super::keyring::Keyring;
 use super::limits::Limits;
+use super::memory::MemoryBudget;
 use super::problem::Problem;
 use super::{metrics, openapi};
 use crate::jobs::{JobError, Jobs};
@@ -69,6 +70,8 @@ pub struct Parts {
     pub jobs: Jobs,
     /// Where requests compute.
     pub compute: Compute,
+    /// What requests may take of the memory.
+    pub memory: MemoryBudget,
     /// Held while a request reads the catalogue and then changes it by what it read.
     pub catalogue: Mutex<()>,
     /// Set when the service is asked to stop; open streams end then.
@@ -129,7 +132,9 @@ impl AppState {
             queue: config.query_queue,
             wait: config.query_wait,
         })?;
+        let memory = MemoryBudget::new(config.memory_bytes);
         Ok(Self(Arc::new(Parts {
+            memory,
             store,
             keys,
             limits: Limits::new(config.key_limits),

@@ -26,6 +26,15 @@ pub enum JobError {
         /// How it ended.
         state: JobState,
     },
+    /// The store as a whole is to be changed, and jobs are in the way.
+    #[error("{jobs} jobs wait or run; wait for them or cancel them first")]
+    Unfinished {
+        /// How many.
+        jobs: usize,
+    },
+    /// The store as a whole is being changed.
+    #[error("a snapshot is being restored; try again when it is done")]
+    Paused,
     /// The parameters of the job are not usable.
     #[error(transparent)]
     Parameter(#[from] crate::parameters::ParameterError),

@@ -5,6 +5,7 @@
 
 mod describe;
 pub mod error;
+mod exclusive;
 mod failure;
 mod live;
 mod plan;
@@ -77,8 +78,20 @@ struct State {
     running: Option<Running>,
     /// One per job that is not finished.
     channels: HashMap<JobId, watch::Sender<Job>>,
+    /// Jobs that have ended without the store taking it.
+    unwritten: Vec<Job>,
+    /// Whether jobs are refused because the store as a whole is being changed.
+    paused: bool,
     stopping: bool,
     stopped: bool,
+}
+
+impl State {
+    /// A job the store does not have, or not as it is.
+    fn in_memory(&self, id: JobId) -> Option<Job> {
+        let unfinished = self.channels.get(&id).map(|channel| channel.borrow().clone());
+        unfinished.or_else(|| self.unwritten.iter().find(|job| job.id == id).cloned())
+    }
 }
 
 struct Running {
@@ -214,6 +227,9 @@ impl Jobs {
         if state.stopping {
             return Err(JobError::ShuttingDown);
         }
+        if state.paused {
+            return Err(JobError::Paused);
+        }
         if state.waiting.len() >= limit {
             return Err(JobError::QueueFull { limit });
         }
@@ -231,10 +247,10 @@ impl Jobs {
     /// # Errors
     /// [`JobError::NoJob`]; [`JobError::Store`].
     pub fn job(&self, id: JobId) -> Result<Job, JobError> {
-        if let Some(channel) = self.inner.state().channels.get(&id) {
-            return Ok(channel.borrow().clone());
+        match self.inner.state().in_memory(id) {
+            Some(job) => Ok(job),
+            None => Ok(self.inner.store.job(id)?),
         }
-        Ok(self.inner.store.job(id)?)
     }
 
     /// Up to `limit` jobs, newest first, those older than `before` only.
@@ -245,8 +261,8 @@ impl Jobs {
         let mut jobs = self.inner.store.list_jobs(before, limit)?;
         let state = self.inner.state();
         for job in &mut jobs {
-            if let Some(channel) = state.channels.get(&job.id) {
-                job.clone_from(&channel.borrow());
+            if let Some(latest) = state.in_memory(job.id) {
+                *job = latest;
             }
         }
         Ok(jobs)
@@ -291,7 +307,7 @@ impl Jobs {
         if let Some(channel) = self.inner.state().channels.get(&id) {
             return Ok(channel.subscribe());
         }
-        Ok(watch::Sender::new(self.inner.store.job(id)?).subscribe())
+        Ok(watch::Sender::new(self.job(id)?).subscribe())
     }
 
     /// The index queries run against. Never blocks; hold it for as long as a query runs, and it stays what it is.

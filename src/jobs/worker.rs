@@ -6,13 +6,18 @@ use super::reindex::{Outcome, Reindex, reindex};
 use super::{Inner, JobError, Running};
 use crate::cancel::Cancel;
 use crate::model::{Job, JobFailure, JobId, JobKind, JobState};
+use crate::store::Health;
 use jiff::Timestamp;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, PoisonError};
+use std::time::Duration;
 use tokio::sync::watch;
 
 /// A job that was running at that many crashes is not tried again.
 const MAX_ATTEMPTS: u32 = 3;
+
+/// How often a worker with jobs looks whether the store takes writes again.
+const LOOK_AGAIN: Duration = Duration::from_millis(200);
 
 /// Puts the jobs a former process left unfinished back into the queue.
 pub(super) fn requeue_interrupted(inner: &Inner) -> Result<(), JobError> {
@@ -76,6 +81,15 @@ fn next(inner: &Inner) -> Option<(JobId, watch::Sender<Job>, Cancel)> {
     loop {
         if state.stopping {
             return None;
+        }
+        // A job begun now could not write what it learns. It waits for the disk; queries go on.
+        if !state.waiting.is_empty() && inner.store.health() != Health::Ready {
+            state = inner
+                .changed
+                .wait_timeout(state, LOOK_AGAIN)
+                .unwrap_or_else(PoisonError::into_inner)
+                .0;
+            continue;
         }
         let Some(id) = state.waiting.pop_front() else {
             state = inner.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
@@ -156,6 +170,9 @@ fn finish(inner: &Inner, id: JobId, channel: &watch::Sender<Job>, ended: Result<
         .and_then(|()| inner.store.forget_old_jobs())
     {
         tracing::error!(%error, job = %id, "the end of a job was not written");
+        if job.state.is_finished() {
+            state.unwritten.push(job.clone());
+        }
     }
     channel.send_replace(job);
     inner.count(&state);

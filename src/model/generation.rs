@@ -25,6 +25,14 @@ impl Generation {
     pub fn class(&self, id: ClassId) -> Option<&GenerationClass> {
         self.classes.iter().find(|class| class.class == id)
     }
+
+    /// The store's keys of all its dictionaries.
+    pub fn dictionary_keys(&self) -> impl Iterator<Item = &str> {
+        self.classes.iter().flat_map(|class| {
+            let of_shapes = class.shape_dictionaries.iter().map(|s| s.dictionary.as_str());
+            std::iter::once(class.dictionary.as_str()).chain(of_shapes)
+        })
+    }
 }
 
 /// A class as a generation learnt it.

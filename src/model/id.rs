@@ -83,6 +83,7 @@ identifier!(ClassId, "a class");
 identifier!(ShapeId, "a training shape");
 identifier!(JobId, "a job");
 identifier!(KeyId, "an API key");
+identifier!(SnapshotId, "a snapshot");
 
 #[cfg(test)]
 mod tests {

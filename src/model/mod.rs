@@ -10,13 +10,15 @@ pub mod id;
 pub mod job;
 pub mod key;
 pub mod shape;
+pub mod snapshot;
 
 pub use class::{Class, ClassName, ClassNameError};
 pub use generation::{Generation, GenerationClass, GenerationShape};
-pub use id::{ClassId, IdError, JobId, KeyId, ShapeId};
+pub use id::{ClassId, IdError, JobId, KeyId, ShapeId, SnapshotId};
 pub use job::{
     FailedShape, Job, JobFailure, JobKind, JobState, ReindexReport, ReindexScope, RelearnedClass,
     SkippedClass, Step,
 };
 pub use key::{ApiKey, KeyHash, KeyLimits, KeyName, KeyNameError, Scope};
 pub use shape::{CompanionFile, ContentHash, ContentHashError, NewShape, Shape, ShapePose};
+pub use snapshot::{Restored, Snapshot, SnapshotOrigin};

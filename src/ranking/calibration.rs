@@ -131,7 +131,9 @@ mod tests {
 
     /// 20 scores about `level`, by a factor of at most 1.1.
     fn around(level: f64) -> Vec<f64> {
-        (0..20).map(|i| level * 1.1f64.powf(f64::from(i) / 9.5 - 1.0)).collect()
+        (0..20)
+            .map(|i| level * 1.1f64.powf(f64::from(i) / 9.5 - 1.0))
+            .collect()
     }
 
     fn two_classes() -> Calibration {

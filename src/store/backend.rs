@@ -47,6 +47,10 @@ pub trait Backend: Send + Sync {
 
     /// Makes everything applied before durable.
     fn flush(&self) -> Result<(), StoreError>;
+
+    /// Lets go of everything in memory, does `meanwhile` while nothing is open, and opens what the disk holds then.
+    /// Reads wait for it. Opens also where `meanwhile` fails, and returns its failure.
+    fn reopen(&self, meanwhile: &mut dyn FnMut() -> Result<(), StoreError>) -> Result<(), StoreError>;
 }
 
 /// The smallest key greater than every key that starts with `prefix`; `None` where there is none.

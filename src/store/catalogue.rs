@@ -326,13 +326,14 @@ impl Store {
     }
 
     /// Removes stored files no shape refers to. A file that cannot be removed now is left for the next collection.
-    fn remove_unreferenced(&self, contents: impl Iterator<Item = ContentHash>) {
+    pub(super) fn remove_unreferenced(&self, contents: impl Iterator<Item = ContentHash>) {
+        let contents: BTreeSet<ContentHash> = contents.collect();
         let _gate = self.inner.files.write().unwrap_or_else(PoisonError::into_inner);
         // After a failed write the log may hold a change the records do not show yet, and that change needs its files.
-        if self.inner.writable().is_err() {
+        if self.inner.writable().is_err() || self.is_pinned(&contents) {
             return;
         }
-        for content in contents.collect::<BTreeSet<_>>() {
+        for content in contents {
             let removed = self.is_referenced(content).and_then(|referenced| {
                 if referenced {
                     Ok(())

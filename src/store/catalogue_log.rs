@@ -172,6 +172,24 @@ impl CatalogueLog {
         Ok(())
     }
 
+    /// Takes back the event appended last, whose line began at `length`. Says whether it is gone for good.
+    pub fn take_back(&mut self, length: u64) -> bool {
+        let gone = self
+            .file
+            .set_len(length)
+            .and_then(|()| self.file.sync_data())
+            .is_ok();
+        if gone {
+            self.length = length;
+        }
+        gone
+    }
+
+    /// Bytes of the log.
+    pub fn length(&self) -> u64 {
+        self.length
+    }
+
     /// Replaces the log by one that holds just these events, numbered from `first`.
     ///
     /// # Errors

@@ -1,9 +1,9 @@
 //! Why the store could not do what it was asked.
 
-use crate::model::{ClassId, ClassName, JobId, KeyId, KeyName, ShapeId};
+use crate::model::{ClassId, ClassName, JobId, KeyId, KeyName, ShapeId, SnapshotId};
 use std::path::PathBuf;
 
-/// The store's errors. Those up to [`StoreError::TooManyKeys`] are the caller's; the others are the machine's.
+/// The store's errors. Those up to [`StoreError::BadSnapshot`] are the caller's; the others are the machine's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StoreError {
     /// There is no such class.
@@ -51,6 +51,21 @@ pub enum StoreError {
     TooManyKeys {
         /// The most there may be.
         limit: usize,
+    },
+    /// There is no such snapshot.
+    #[error("there is no snapshot {id}")]
+    NoSnapshot {
+        /// The identifier asked for.
+        id: SnapshotId,
+    },
+    /// A snapshot is being made or restored, and there is one at a time.
+    #[error("another snapshot is being made or restored; try again when it is done")]
+    SnapshotRunning,
+    /// A file is no snapshot, or not one that can be restored. Nothing was changed.
+    #[error("the snapshot cannot be restored: {detail}")]
+    BadSnapshot {
+        /// What is wrong with it.
+        detail: String,
     },
     /// The disk is full. Nothing was changed.
     #[error("the disk is full: {detail}")]
@@ -112,6 +127,12 @@ impl StoreError {
                 what,
                 detail: error.to_string(),
             },
+        }
+    }
+
+    pub(crate) fn bad_snapshot(detail: impl Into<String>) -> Self {
+        Self::BadSnapshot {
+            detail: detail.into(),
         }
     }
 

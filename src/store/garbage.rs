@@ -1,7 +1,7 @@
 //! Removing what nothing refers to any more: dictionaries of earlier generations, stored files without a shape, cached
 //! signatures of other parameters, unfinished temporary files.
 
-use super::{Batch, Store, StoreError, files, keys, record};
+use super::{Batch, Store, StoreError, files, keys, originals, record};
 use crate::model::{ContentHash, Generation, Shape};
 use crate::parameters::Parameters;
 use std::collections::BTreeSet;
@@ -37,12 +37,14 @@ impl Store {
         let _gate = self.inner.files.write().unwrap_or_else(PoisonError::into_inner);
         // Looked at again under the gate: a change that failed meanwhile may still need its files.
         self.inner.writable()?;
-        files::walk(&self.inner.path.join("originals"), |path, name| {
+        // A snapshot being written may need what nothing refers to any more; the next collection takes it.
+        let held = self.is_pinned(&BTreeSet::new());
+        files::walk(&self.inner.path.join(originals::DIRECTORY), |path, name| {
             let kept = match name.parse::<ContentHash>() {
                 Ok(content) => self.is_referenced(content)?,
                 Err(_) => false,
             };
-            if !kept {
+            if !kept && !held {
                 files::remove(path)?;
                 garbage.originals += 1;
             }
@@ -59,11 +61,8 @@ impl Store {
     fn collect_dictionaries(&self, generation: Option<&Generation>) -> Result<usize, StoreError> {
         let kept: BTreeSet<Vec<u8>> = generation
             .iter()
-            .flat_map(|g| &g.classes)
-            .flat_map(|c| {
-                std::iter::once(&c.dictionary).chain(c.shape_dictionaries.iter().map(|s| &s.dictionary))
-            })
-            .map(|key| keys::dictionary(key))
+            .flat_map(|g| g.dictionary_keys())
+            .map(keys::dictionary)
             .collect();
         let mut batch = Batch::default();
         let mut after: Option<Vec<u8>> = None;

@@ -64,6 +64,12 @@ pub(super) fn reference(content: ContentHash, id: ShapeId) -> Vec<u8> {
     join(&[REFERENCE, &content.to_bytes(), &id.to_bytes()])
 }
 
+/// The stored file a reference is about; `None` where the key is no reference.
+pub(super) fn content_of_reference(key: &[u8]) -> Option<ContentHash> {
+    let hash = key.strip_prefix(REFERENCE)?.first_chunk()?;
+    Some(ContentHash::from_bytes(*hash))
+}
+
 pub(super) fn dictionary(key: &str) -> Vec<u8> {
     join(&[DICTIONARY, key.as_bytes()])
 }

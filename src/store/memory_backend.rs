@@ -17,6 +17,10 @@ struct State {
     writes: u64,
     fail_at: Option<u64>,
     failed: bool,
+    /// Whether the planned failure is a full disk.
+    full: bool,
+    /// Batches that were not flushed and are there all the same when the engine is opened again.
+    survivors: usize,
 }
 
 /// A map that behaves as an engine does on a disk that may fail: what is applied is visible at once and durable after
@@ -39,6 +43,20 @@ impl MemoryBackend {
     pub fn fail_after(&self, n: u64) {
         let mut state = self.state();
         state.fail_at = Some(state.writes + n);
+    }
+
+    /// Like [`fail_after`](Self::fail_after), as a full disk does.
+    pub fn fill_after(&self, n: u64) {
+        self.fail_after(n);
+        self.state().full = true;
+    }
+
+    /// The disk has space again. When it is opened again, the engine finds everything flushed and the first
+    /// `survivors` of the batches that were not.
+    pub fn heal(&self, survivors: usize) {
+        let mut state = self.state();
+        state.fail_at = None;
+        state.survivors = survivors;
     }
 
     /// How many applies and flushes were tried.
@@ -96,9 +114,13 @@ impl State {
         self.writes += 1;
         if fails {
             self.failed = true;
-            return Err(StoreError::Io {
-                what: "write records".to_owned(),
-                detail: "planned failure".to_owned(),
+            let what = "write records".to_owned();
+            return Err(match self.full {
+                true => StoreError::Full { detail: what },
+                false => StoreError::Io {
+                    what,
+                    detail: "planned failure".to_owned(),
+                },
             });
         }
         Ok(())
@@ -165,5 +187,18 @@ impl Backend for MemoryBackend {
         state.pending.clear();
         state.durable = state.current.clone();
         Ok(())
+    }
+    fn reopen(&self, meanwhile: &mut dyn FnMut() -> Result<(), StoreError>) -> Result<(), StoreError> {
+        let mut state = self.state();
+        let done = meanwhile();
+        let survivors = state.survivors;
+        let pending = std::mem::take(&mut state.pending);
+        let mut map = state.durable.clone();
+        for batch in pending.iter().take(survivors) {
+            apply(&mut map, batch);
+        }
+        state.current.clone_from(&map);
+        state.durable = map;
+        done
     }
 }

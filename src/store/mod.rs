@@ -5,8 +5,9 @@
 //! which the records can be rebuilt. `docs/storage.md` describes the data directory key by key.
 //!
 //! **What is acknowledged is durable**: a method that changes something returns after the disk has confirmed it.
-//! After a failed write the store is read-only ([`Store::health`] says why) until it is opened again, since nobody
-//! knows what a disk holds after a write it refused.
+//! After a failed write the store is read-only ([`Store::health`] says why), since nobody knows what a disk holds after
+//! a write it refused. Where the disk was only full, [`Store::recover`] makes it writable again once there is space;
+//! after any other failure it has to be opened again.
 
 mod api_keys;
 pub mod backend;
@@ -32,8 +33,10 @@ mod payload;
 mod payload_jobs;
 mod rebuild;
 pub mod record;
+mod recover;
 mod signatures;
 mod sled_backend;
+pub mod snapshot;
 mod usage;
 
 pub use api_keys::MAX_KEYS;
@@ -53,7 +56,7 @@ use event::Event;
 use payload::Number;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 /// How a store is opened.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -109,8 +112,12 @@ struct Inner {
     /// Held shared while stored files are written and not yet referred to, exclusively while unreferenced ones are
     /// removed.
     files: RwLock<()>,
+    /// Counts the snapshots being written, and remembers the files whose removal waits for them.
+    pinned: Mutex<snapshot::Pinned>,
+    /// Held by whoever makes or restores a snapshot: one at a time.
+    snapshots: Mutex<()>,
     /// The first failed write.
-    failure: OnceLock<String>,
+    failure: Mutex<Option<StoreError>>,
     recovery: Vec<String>,
     /// Released when the last clone is dropped.
     _lock: File,
@@ -128,19 +135,26 @@ impl Inner {
         self.writer.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    fn failure(&self) -> MutexGuard<'_, Option<StoreError>> {
+        // Assigned whole, never half.
+        self.failure.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn writable(&self) -> Result<(), StoreError> {
-        match self.failure.get() {
+        match &*self.failure() {
             None => Ok(()),
-            Some(why) => Err(StoreError::ReadOnly { why: why.clone() }),
+            Some(full @ StoreError::Full { .. }) => Err(full.clone()),
+            Some(other) => Err(StoreError::ReadOnly {
+                why: other.to_string(),
+            }),
         }
     }
 
     /// Remembers that a write failed; from now on all are refused.
     fn fail(&self, error: StoreError) -> StoreError {
-        let why = error.to_string();
-        tracing::error!(%why, "a write failed; the store is read-only now");
+        tracing::error!(%error, "a write failed; the store is read-only now");
         // Only the first failure is kept.
-        let _ = self.failure.set(why);
+        self.failure().get_or_insert_with(|| error.clone());
         error
     }
 
@@ -163,6 +177,7 @@ impl Inner {
         let mut batch = event::stage(&*self.backend, event)?;
         batch.writes.extend(more.writes);
         event::put(&mut batch, keys::META_SEQUENCE.to_vec(), &Number(sequence))?;
+        let length = writer.log.length();
         if let Err(append) = writer.log.append(sequence, event) {
             return Err(if append.in_doubt {
                 self.fail(append.error)
@@ -170,7 +185,15 @@ impl Inner {
                 append.error
             });
         }
-        self.commit(&batch, true)?;
+        if let Err(error) = self.commit(&batch, true) {
+            // A full disk refuses and forgets. Where the records took the change after all, they are believed.
+            if matches!(error, StoreError::Full { .. }) && !writer.log.take_back(length) {
+                tracing::warn!(
+                    "the catalogue log keeps a change that was refused; it happens at the next start"
+                );
+            }
+            return Err(error);
+        }
         writer.sequence = sequence;
         Ok(())
     }
@@ -184,9 +207,9 @@ impl Store {
 
     /// Whether the store takes writes; readiness asks.
     pub fn health(&self) -> Health {
-        match self.inner.failure.get() {
+        match &*self.inner.failure() {
             None => Health::Ready,
-            Some(why) => Health::ReadOnly { why: why.clone() },
+            Some(why) => Health::ReadOnly { why: why.to_string() },
         }
     }
 

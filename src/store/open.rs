@@ -4,11 +4,11 @@ use super::backend::{Backend, Batch};
 use super::catalogue_log::{self, CatalogueLog, LogScan};
 use super::event::{self, Event, get, put, shapes_of};
 use super::payload::Number;
-use super::{Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, rebuild};
+use super::{Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, rebuild, snapshot};
 use crate::model::Class;
 use std::fs::{File, TryLockError};
 use std::path::Path;
-use std::sync::{Arc, Mutex, OnceLock, RwLock};
+use std::sync::{Arc, Mutex, RwLock};
 
 pub(super) const LOG: &str = "catalogue.log";
 
@@ -54,6 +54,7 @@ fn prepare(path: &Path) -> Result<File, StoreError> {
         }
         Err(TryLockError::Error(error)) => return Err(fail(error)),
     }
+    snapshot::finish_restore(path)?;
     let format = migrate::check_format(path)?;
     refuse_to_forget(path, format.is_some())?;
     if format != Some(migrate::FORMAT) {
@@ -88,16 +89,41 @@ fn finish(
     lock: File,
     mut recovery: Vec<String>,
 ) -> Result<Store, StoreError> {
-    migrate::run(&*backend)?;
+    let writer = settle(path, &*backend, &mut recovery)?;
+    for line in &recovery {
+        tracing::warn!(line, "recovered");
+    }
+    Ok(Store {
+        inner: Arc::new(Inner {
+            path: path.to_owned(),
+            backend,
+            writer: Mutex::new(writer),
+            files: RwLock::new(()),
+            pinned: Mutex::default(),
+            snapshots: Mutex::new(()),
+            failure: Mutex::new(None),
+            recovery,
+            _lock: lock,
+        }),
+    })
+}
+
+/// Brings records and log to the same state, whatever a crash or a failed write left, and opens the log.
+pub(super) fn settle(
+    path: &Path,
+    backend: &dyn Backend,
+    recovery: &mut Vec<String>,
+) -> Result<Writer, StoreError> {
+    migrate::run(backend)?;
     let log_path = path.join(LOG);
-    let (scan, replayed) = replay(&*backend, &log_path)?;
+    let (scan, replayed) = replay(backend, &log_path)?;
     if replayed > 0 {
         recovery.push(format!(
             "{replayed} changes of the catalogue were taken from the catalogue log"
         ));
     }
     let mut log = CatalogueLog::open(&log_path, scan.good_length)?;
-    let mut sequence = sequence(&*backend)?;
+    let mut sequence = sequence(backend)?;
     if scan.last < sequence || !scan.damaged.is_empty() {
         for (line, detail) in &scan.damaged {
             recovery.push(format!(
@@ -110,22 +136,9 @@ fn finish(
                 scan.last
             ));
         }
-        sequence = rewrite_log(&*backend, &mut log, sequence.max(scan.last))?;
+        sequence = rewrite_log(backend, &mut log, sequence.max(scan.last))?;
     }
-    for line in &recovery {
-        tracing::warn!(line, "recovered");
-    }
-    Ok(Store {
-        inner: Arc::new(Inner {
-            path: path.to_owned(),
-            backend,
-            writer: Mutex::new(Writer { log, sequence }),
-            files: RwLock::new(()),
-            failure: OnceLock::new(),
-            recovery,
-            _lock: lock,
-        }),
-    })
+    Ok(Writer { log, sequence })
 }
 
 fn sequence(backend: &dyn Backend) -> Result<u64, StoreError> {

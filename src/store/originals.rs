@@ -4,11 +4,14 @@ use super::{Store, StoreError, files, keys};
 use crate::model::ContentHash;
 use std::path::PathBuf;
 
+/// The directory of all stored files, inside the data directory.
+pub(super) const DIRECTORY: &str = "originals";
+
 impl Store {
     /// Where a stored file lies, for reading it as a stream. It may be missing.
     pub fn original_path(&self, content: ContentHash) -> PathBuf {
         let name = content.to_string();
-        self.inner.path.join("originals").join(&name[..2]).join(name)
+        self.inner.path.join(DIRECTORY).join(&name[..2]).join(name)
     }
 
     /// A stored file.

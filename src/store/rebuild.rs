@@ -4,7 +4,7 @@
 //! `sled`, which becomes `sled.damaged-<time>`. Killed at any point, the next start goes on from there.
 
 use super::backend::{Backend, Batch, Entry};
-use super::event::get;
+use super::event::{files_of, get};
 use super::open::{LOG, replay};
 use super::payload::Number;
 use super::sled_backend::SledBackend;
@@ -132,11 +132,7 @@ fn drop_broken_links(backend: &dyn Backend, recovery: &mut Vec<String>) -> Resul
         let whole = match &generation {
             None => false,
             Some(generation) => generation
-                .classes
-                .iter()
-                .flat_map(|c| {
-                    std::iter::once(&c.dictionary).chain(c.shape_dictionaries.iter().map(|s| &s.dictionary))
-                })
+                .dictionary_keys()
                 .map(|key| backend.get(&keys::dictionary(key)))
                 .collect::<Result<Vec<_>, _>>()?
                 .iter()
@@ -169,7 +165,7 @@ fn report_missing_files(
 ) -> Result<(), StoreError> {
     for (key, value) in backend.scan(keys::SHAPE, None, usize::MAX)? {
         let shape: crate::model::Shape = record::unseal(&key, &value)?;
-        for content in super::event::files_of(&shape) {
+        for content in files_of(&shape) {
             let name = content.to_string();
             if !data.join("originals").join(&name[..2]).join(&name).exists() {
                 recovery.push(format!("the file {name} of shape {} is missing", shape.id));

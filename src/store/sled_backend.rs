@@ -4,11 +4,19 @@ use super::StoreError;
 use super::backend::{Backend, Batch, Entry, prefix_end};
 use std::ops::Bound;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{PoisonError, RwLock};
+use std::time::{Duration, Instant};
+
+/// How long a directory is tried again that the engine just closed: its own threads let go of it a little later.
+const OPEN_WITHIN: Duration = Duration::from_secs(10);
 
 /// The key-value engine in a directory of its own.
 pub struct SledBackend {
-    db: sled::Db,
+    path: PathBuf,
+    cache_bytes: u64,
+    /// `None` only where opening it again failed.
+    db: RwLock<Option<sled::Db>>,
 }
 
 impl SledBackend {
@@ -18,16 +26,49 @@ impl SledBackend {
     /// Whatever keeps sled from opening it. sled can panic on a damaged directory; that is caught and is an error
     /// like the others.
     pub fn open(path: &Path, cache_bytes: u64) -> Result<Self, StoreError> {
-        remove_unfinished_snapshots(path)?;
-        // We flush before every acknowledgement ourselves; sled's timer would only add wake-ups of an idle process.
-        let config = sled::Config::new()
-            .path(path)
-            .cache_capacity(cache_bytes)
-            .mode(sled::Mode::LowSpace)
-            .flush_every_ms(None);
-        let db = caught("open the key-value store", || Ok(config.open().map_err(unopened)))??;
-        Ok(Self { db })
+        Ok(Self {
+            path: path.to_owned(),
+            cache_bytes,
+            db: RwLock::new(Some(open(path, cache_bytes)?)),
+        })
     }
+
+    fn with<T>(&self, what: &str, work: impl FnOnce(&sled::Db) -> sled::Result<T>) -> Result<T, StoreError> {
+        let db = self.db.read().unwrap_or_else(PoisonError::into_inner);
+        match &*db {
+            Some(db) => caught(what, || work(db)),
+            None => Err(StoreError::Io {
+                what: what.to_owned(),
+                detail: "the key-value store could not be opened again".to_owned(),
+            }),
+        }
+    }
+}
+
+fn open(path: &Path, cache_bytes: u64) -> Result<sled::Db, StoreError> {
+    remove_unfinished_snapshots(path)?;
+    // We flush before every acknowledgement ourselves; sled's timer would only add wake-ups of an idle process.
+    let config = sled::Config::new()
+        .path(path)
+        .cache_capacity(cache_bytes)
+        .mode(sled::Mode::LowSpace)
+        .flush_every_ms(None);
+    let began = Instant::now();
+    loop {
+        match caught("open the key-value store", || Ok(config.open()))? {
+            Ok(db) => return Ok(db),
+            // Nobody else can be here, since the data directory is locked: it is our own engine, just closed.
+            Err(error) if is_held(&error) && began.elapsed() < OPEN_WITHIN => {
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            Err(error) => return Err(unopened(error)),
+        }
+    }
+}
+
+/// Whether somebody holds sled's own lock.
+fn is_held(error: &sled::Error) -> bool {
+    matches!(error, sled::Error::Io(error) if error.to_string().contains("could not acquire lock"))
 }
 
 /// sled writes a snapshot of its page table to `snap.….generating` and renames it. One left over from an abrupt stop
@@ -97,7 +138,8 @@ fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
 
 impl Backend for SledBackend {
     fn get(&self, key: &[u8]) -> Result<Option<Vec<u8>>, StoreError> {
-        caught("read a record", || self.db.get(key)).map(|value| value.map(|v| v.to_vec()))
+        self.with("read a record", |db| db.get(key))
+            .map(|value| value.map(|v| v.to_vec()))
     }
 
     fn scan(&self, prefix: &[u8], after: Option<&[u8]>, limit: usize) -> Result<Vec<Entry>, StoreError> {
@@ -111,9 +153,8 @@ impl Backend for SledBackend {
         {
             return Ok(Vec::new());
         }
-        caught("scan records", || {
-            self.db
-                .range((low, high))
+        self.with("scan records", |db| {
+            db.range((low, high))
                 .take(limit)
                 .map(|entry| entry.map(|(k, v)| (k.to_vec(), v.to_vec())))
                 .collect()
@@ -138,9 +179,8 @@ impl Backend for SledBackend {
         {
             return Ok(Vec::new());
         }
-        caught("scan records", || {
-            self.db
-                .range((Bound::Included(prefix.to_vec()), high))
+        self.with("scan records", |db| {
+            db.range((Bound::Included(prefix.to_vec()), high))
                 .rev()
                 .take(limit)
                 .map(|entry| entry.map(|(k, v)| (k.to_vec(), v.to_vec())))
@@ -156,10 +196,27 @@ impl Backend for SledBackend {
                 None => sled_batch.remove(key.as_slice()),
             }
         }
-        caught("write records", || self.db.apply_batch(sled_batch))
+        self.with("write records", |db| db.apply_batch(sled_batch))
     }
 
     fn flush(&self) -> Result<(), StoreError> {
-        caught("flush the key-value store", || self.db.flush()).map(|_| ())
+        self.with("flush the key-value store", |db| db.flush())
+            .map(|_| ())
+    }
+
+    fn reopen(&self, meanwhile: &mut dyn FnMut() -> Result<(), StoreError>) -> Result<(), StoreError> {
+        let mut db = self.db.write().unwrap_or_else(PoisonError::into_inner);
+        let closing = db.take();
+        // Closing flushes, and after a failure that may fail or panic again; what counts is what is opened below.
+        let closed = caught("close the key-value store", || {
+            drop(closing);
+            Ok(())
+        });
+        if let Err(error) = closed {
+            tracing::warn!(%error, "the key-value store was not closed in good order");
+        }
+        let done = meanwhile();
+        *db = Some(open(&self.path, self.cache_bytes)?);
+        done
     }
 }

@@ -14,4 +14,5 @@ mod meshes;
 mod operation;
 mod promises;
 mod security;
+mod snapshots;
 mod uploads;

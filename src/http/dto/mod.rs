@@ -9,6 +9,7 @@ pub mod parameters;
 pub mod problem;
 pub mod query;
 pub mod shape;
+pub mod snapshot;
 
 use crate::http::problem::{Code, Problem};
 use base64::Engine;

@@ -8,3 +8,4 @@ pub mod jobs;
 pub mod keys;
 pub mod query;
 pub mod shapes;
+pub mod snapshots;

@@ -1,0 +1,66 @@
+//! The switch from the old state to a restored one, by renames, in an order that can be taken up again anywhere.
+//!
+//! `restore.unpacking` becomes `restore.ready` once everything in it is checked and on the disk. From that rename on
+//! the restored state is the one that counts: whoever finds `restore.ready`, moves its parts into place and those they
+//! replace to `restore.replaced`, which goes at the end.
+
+use super::super::open::LOG;
+use super::super::{StoreError, files, originals};
+use std::path::Path;
+
+pub(super) const UNPACKING: &str = "restore.unpacking";
+const READY: &str = "restore.ready";
+const REPLACED: &str = "restore.replaced";
+
+/// What is switched. The cached signatures stay: they are named by what they were computed from.
+const PARTS: [&str; 3] = ["sled", LOG, originals::DIRECTORY];
+
+/// Makes the checked state the one that counts.
+pub(super) fn declare_ready(data: &Path) -> Result<(), StoreError> {
+    remove(&data.join(REPLACED))?;
+    rename(&data.join(UNPACKING), &data.join(READY))?;
+    files::sync_directory(data)
+}
+
+/// Goes on with a switch that was declared, from wherever it stopped; removes what one that was not declared left.
+/// Nothing of the data directory may be open but its lock.
+pub(in super::super) fn finish_restore(data: &Path) -> Result<(), StoreError> {
+    remove(&data.join(UNPACKING))?;
+    go_on(data)?;
+    super::tidy(data)
+}
+
+/// Goes on with a switch that was declared, and leaves everything else alone.
+pub(in super::super) fn go_on(data: &Path) -> Result<(), StoreError> {
+    let (ready, replaced) = (data.join(READY), data.join(REPLACED));
+    if ready.exists() {
+        tracing::warn!("switching to the restored state");
+        std::fs::create_dir_all(&replaced).map_err(|e| StoreError::io("put the old state aside", &e))?;
+        for part in PARTS {
+            let (new, place) = (ready.join(part), data.join(part));
+            if !new.exists() {
+                continue;
+            }
+            if place.exists() {
+                rename(&place, &replaced.join(part))?;
+            }
+            rename(&new, &place)?;
+            files::sync_directory(data)?;
+        }
+        remove(&ready)?;
+        files::sync_directory(data)?;
+    }
+    remove(&replaced)
+}
+
+fn rename(from: &Path, to: &Path) -> Result<(), StoreError> {
+    std::fs::rename(from, to).map_err(|e| StoreError::io(format!("rename {}", from.display()), &e))
+}
+
+pub(super) fn remove(directory: &Path) -> Result<(), StoreError> {
+    match std::fs::remove_dir_all(directory) {
+        Ok(()) => Ok(()),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(StoreError::io(format!("remove {}", directory.display()), &error)),
+    }
+}
