@@ -59,7 +59,12 @@ where
 }
 
 /// Joins points given in drawn units.
-pub(super) fn path(area: &Area<'_>, points: Vec<(i32, i32)>, i: usize, width: f64) -> Result<(), FigureError> {
+pub(super) fn path(
+    area: &Area<'_>,
+    points: Vec<(i32, i32)>,
+    i: usize,
+    width: f64,
+) -> Result<(), FigureError> {
     Ok(area.draw(&PathElement::new(points, stroke(width, series(i))))?)
 }
 

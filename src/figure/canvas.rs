@@ -8,9 +8,9 @@ use super::palette::INK;
 use plotters::coord::Shift;
 use plotters::drawing::{DrawingArea, IntoDrawingArea};
 use plotters::element::{PathElement, Rectangle, Text};
+use plotters::prelude::SVGBackend;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, FontTransform, RGBColor, ShapeStyle, TextStyle, WHITE};
-use plotters::prelude::SVGBackend;
 
 /// Drawn units per shown pixel.
 pub(super) const UNIT: i32 = 8;
@@ -148,15 +148,19 @@ fn escape(text: &str) -> String {
         .replace('"', "&quot;")
 }
 
-/// A number as short as it can be told apart: 0.0123, 4.56, 1234.
+/// A number to three digits or so: 0.0123, 4.5, 1234.
 pub(super) fn number(value: f64) -> String {
     let magnitude = value.abs();
     if magnitude == 0.0 {
         "0".to_owned()
-    } else if magnitude >= 1e6 || magnitude < 1e-4 {
+    } else if !(1e-4..1e6).contains(&magnitude) {
         format!("{value:.1e}")
     } else {
         let decimals = (2 - magnitude.log10().floor() as i32).clamp(0, 6) as usize;
-        format!("{value:.decimals$}")
+        let text = format!("{value:.decimals$}");
+        match text.contains('.') {
+            true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+            false => text,
+        }
     }
 }

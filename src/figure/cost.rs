@@ -107,7 +107,6 @@ fn short(value: &f64) -> String {
         v if v >= 1e6 => tidy(v / 1e6, "M"),
         v if v >= 1e3 => tidy(v / 1e3, "k"),
         v if v >= 1.0 => tidy(v, ""),
-        v if v >= 1e-4 => number(v).trim_end_matches('0').to_owned(),
         v => number(v),
     }
 }
@@ -131,10 +130,7 @@ mod tests {
 
     #[test]
     fn ticks_are_short() {
-        let texts: Vec<String> = [0.002, 0.5, 1.0, 20.0, 1000.0, 2.5e6]
-            .iter()
-            .map(short)
-            .collect();
+        let texts: Vec<String> = [0.002, 0.5, 1.0, 20.0, 1000.0, 2.5e6].iter().map(short).collect();
         assert_eq!(texts, ["0.002", "0.5", "1", "20", "1k", "2.5M"]);
     }
 }

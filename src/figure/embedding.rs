@@ -108,38 +108,39 @@ fn name_points(
         let text = label(&point.label);
         let (width, height) = (text_width(&text, NAME), NAME);
         let (x, y) = (pixel(x), pixel(y));
-        // Centres of the candidates, the preferred first.
-        let (dx, dy) = (width / 2.0 + 8.0, height / 2.0 + 6.0);
+        let rise = height / 2.0 + 6.0;
+        // Where the text is anchored, the preferred place first.
         let candidates = [
-            (x + dx, y),
-            (x - dx, y),
-            (x, y - dy - 1.0),
-            (x, y + dy + 1.0),
-            (x + dx, y - dy),
-            (x + dx, y + dy),
-            (x - dx, y - dy),
-            (x - dx, y + dy),
+            (x + 9.0, y, HPos::Left),
+            (x - 9.0, y, HPos::Right),
+            (x, y - rise - 1.0, HPos::Center),
+            (x, y + rise + 1.0, HPos::Center),
+            (x + 5.0, y - rise, HPos::Left),
+            (x + 5.0, y + rise, HPos::Left),
+            (x - 5.0, y - rise, HPos::Right),
+            (x - 5.0, y + rise, HPos::Right),
         ];
-        let bounds = |(cx, cy): (f64, f64)| -> Box {
-            [
-                cx - width / 2.0,
-                cy - height / 2.0,
-                cx + width / 2.0,
-                cy + height / 2.0,
-            ]
+        let bounds = |(x, y, anchor): (f64, f64, HPos)| -> Box {
+            let left = match anchor {
+                HPos::Left => x,
+                HPos::Center => x - width / 2.0,
+                HPos::Right => x - width,
+            };
+            [left, y - height / 2.0, left + width, y + height / 2.0]
         };
-        let covered = |at: (f64, f64)| -> f64 { taken.iter().map(|b| overlap(&bounds(at), b)).sum() };
+        let covered = |at| -> f64 { taken.iter().map(|b| overlap(&bounds(at), b)).sum() };
         let best = candidates
             .into_iter()
             .min_by(|a, b| covered(*a).total_cmp(&covered(*b)))
-            .unwrap_or((x + dx, y));
+            .unwrap_or(candidates[0]);
         taken.push(bounds(best));
         let colour = if point.group.is_empty() {
             INK
         } else {
             series(kind(point))
         };
-        canvas::write(root, &text, best, &font(NAME, colour, HPos::Center, VPos::Center))?;
+        let (x, y, anchor) = best;
+        canvas::write(root, &text, (x, y), &font(NAME, colour, anchor, VPos::Center))?;
     }
     Ok(())
 }

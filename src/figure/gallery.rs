@@ -1,9 +1,9 @@
 //! A gallery of meshes: a row per shape, a column per deformation (the paper's Figures 2 and 3).
 
+use super::FigureError;
 use super::canvas::{self, draw, font, label, px, upwards};
 use super::palette::{INK, MUTED, shaded};
 use super::render::{Frame, facets};
-use super::FigureError;
 use crate::mesh::{Components, MeshError, PrepareOptions, TriMesh, TriangleSoup, prepare};
 use plotters::element::Polygon;
 use plotters::style::text_anchor::{HPos, VPos};
@@ -163,9 +163,8 @@ struct Extent {
 impl Extent {
     fn of(facets: &[super::render::Facet]) -> Self {
         let all = || facets.iter().flat_map(|f| f.corners);
-        let bound = |axis: usize, from: f64, pick: fn(f64, f64) -> f64| {
-            all().map(|c| c[axis]).fold(from, pick)
-        };
+        let bound =
+            |axis: usize, from: f64, pick: fn(f64, f64) -> f64| all().map(|c| c[axis]).fold(from, pick);
         let low = [0, 1].map(|axis| bound(axis, f64::INFINITY, f64::min));
         let high = [0, 1].map(|axis| bound(axis, f64::NEG_INFINITY, f64::max));
         Self {

@@ -96,12 +96,7 @@ pub fn heat_map(title: &str, map: &HeatMap<'_>) -> Result<String, FigureError> {
         }
         let axis = font(13.0, MUTED, HPos::Center, VPos::Center);
         canvas::write(root, map.column_axis, (left + across / 2.0, 54.0), &axis)?;
-        canvas::write(
-            root,
-            map.row_axis,
-            (14.0, top + down / 2.0),
-            &upwards(&axis),
-        )?;
+        canvas::write(root, map.row_axis, (14.0, top + down / 2.0), &upwards(&axis))?;
         let written = r.max(c) <= WRITTEN;
         for (i, row) in map.values.iter().enumerate() {
             for (j, &v) in row.iter().enumerate() {

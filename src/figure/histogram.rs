@@ -1,9 +1,9 @@
 //! Histograms side by side, such as the distributions of signature distances (the paper's Figure 4).
 
+use super::FigureError;
 use super::axes::{Axis, mesh};
 use super::canvas::{self, draw, font, label, number, px, size, stroke};
 use super::palette::{INK, MUTED, series};
-use super::FigureError;
 use plotters::chart::ChartBuilder;
 use plotters::element::{PathElement, Polygon};
 use plotters::style::Color;
@@ -119,8 +119,7 @@ pub fn histograms(
             root.draw(&PathElement::new(outline, stroke(1.0, series(0))))?;
             for other in &panel.others {
                 let i = names.iter().position(|n| *n == other.label).unwrap_or(0);
-                let line: Vec<(i32, i32)> =
-                    steps(&other.shares, largest).map(|(x, y)| at(x, y)).collect();
+                let line: Vec<(i32, i32)> = steps(&other.shares, largest).map(|(x, y)| at(x, y)).collect();
                 root.draw(&PathElement::new(line, stroke(1.0, series(i + 1))))?;
             }
         }

@@ -45,9 +45,7 @@ pub fn classical_mds(distances: MatRef<'_, f64>) -> Result<Embedding, FigureErro
     }
     let means: Vec<f64> = squared.row_iter().map(|row| row.sum() / n as f64).collect();
     let mean = means.iter().sum::<f64>() / n as f64;
-    let gram = Mat::from_fn(n, n, |i, j| {
-        -0.5 * (squared[(i, j)] - means[i] - means[j] + mean)
-    });
+    let gram = Mat::from_fn(n, n, |i, j| -0.5 * (squared[(i, j)] - means[i] - means[j] + mean));
     let eigen = gram
         .self_adjoint_eigen(Side::Lower)
         .map_err(|error| FigureError::Embedding {

@@ -15,8 +15,8 @@ const PITCH: f64 = 0.209;
 const LIGHT: Vector = [-0.40, 0.62, 0.675];
 /// Brightness of what lies in the shade.
 const AMBIENT: f64 = 0.42;
-/// An upright body is this many times as tall as deep.
-const UPRIGHT: f64 = 2.4;
+/// Share of a shape's height in which its feet are looked for.
+const LOWEST: f64 = 0.12;
 
 /// From where a mesh is looked at: the rows point right, up and towards the viewer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,54 +34,34 @@ pub(super) struct Facet {
 }
 
 impl Frame {
-    /// A view of a creature from the side, of an upright one from the front.
+    /// A view that shows most of a shape, standing on its feet.
     ///
-    /// The principal axis along which the odd third moments vanish is taken for the normal of the mirror plane. Of
-    /// the other two the longer is upright where the body is much taller than deep, else the shorter; down is where
-    /// the outermost vertices lie spread like feet.
+    /// Of the directions along the file's axes and the principal axes, down is the one whose outermost vertices lie
+    /// farthest apart with the least between them, as feet do; heads, hands and tails come to a point, and backs are
+    /// filled. The direction of least spread is not upright. The level direction of least spread points to the viewer.
     pub(super) fn of(mesh: &TriMesh) -> Result<Self, FigureError> {
         let v = mesh.vertices();
         let n = v.len() as f64;
         let mean: Vector = std::array::from_fn(|k| v.iter().map(|p| p[k]).sum::<f64>() / n);
-        let centred: Vec<Vector> = v
-            .iter()
-            .map(|p| std::array::from_fn(|k| p[k] - mean[k]))
-            .collect();
+        let centred: Vec<Vector> = v.iter().map(|p| minus(p, &mean)).collect();
         let covariance = Mat::from_fn(3, 3, |i, j| centred.iter().map(|p| p[i] * p[j]).sum::<f64>() / n);
         let eigen = covariance
             .self_adjoint_eigen(Side::Lower)
             .map_err(|error| FigureError::Embedding {
                 detail: format!("{error:?}"),
             })?;
-        let axes: [Vector; 3] = std::array::from_fn(|k| std::array::from_fn(|i| eigen.U()[(i, k)]));
-        let spread: Vector = std::array::from_fn(|k| eigen.S()[k].max(1e-300).sqrt());
-        // Coordinates along the axes, in units of their spread.
-        let local: Vec<Vector> = centred
-            .iter()
-            .map(|p| std::array::from_fn(|k| dot(p, &axes[k]) / spread[k]))
-            .collect();
-        let moment = |f: &dyn Fn(&Vector) -> f64| local.iter().map(f).sum::<f64>() / n;
-        let asymmetry = |a: usize| {
-            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-            moment(&|p| p[a].powi(3)).abs()
-                + moment(&|p| p[a] * p[b] * p[b]).abs()
-                + moment(&|p| p[a] * p[c] * p[c]).abs()
-        };
-        let mirror = (0..3)
-            .min_by(|&a, &b| asymmetry(a).total_cmp(&asymmetry(b)))
-            .unwrap_or(0);
-        // Ascending eigenvalues: the shorter first.
-        let rest: Vec<usize> = (0..3).filter(|&k| k != mirror).collect();
-        let (short, long) = (rest[0], rest[1]);
-        let upright = spread[long] > UPRIGHT * spread[short];
-        let (up, sight) = if upright { (long, short) } else { (short, mirror) };
-        let sign = if feet(&local, up, 1.0) > feet(&local, up, -1.0) {
-            -1.0
-        } else {
-            1.0
-        };
-        let up = axes[up].map(|x| sign * x);
-        Ok(Self::looking(up, axes[sight]))
+        let principal = (0..3).map(|k| std::array::from_fn(|i| eigen.U()[(i, k)]));
+        let own = (0..3).map(|k| std::array::from_fn(|i| f64::from(u8::from(i == k))));
+        // Nothing stands on its flat side.
+        let flat: Vector = std::array::from_fn(|i| eigen.U()[(i, 0)]);
+        let up = own
+            .chain(principal)
+            .filter(|axis| dot(axis, &flat).abs() < 0.7)
+            .flat_map(|axis: Vector| [axis, axis.map(|x| -x)])
+            .map(|up| (feet(&centred, &up), up))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map_or([0.0, 1.0, 0.0], |(_, up)| up);
+        Ok(Self::looking(up, level(&centred, &up)[1]))
     }
 
     /// Looking against `sight`, with `up` upwards, then turned and tilted a little.
@@ -108,26 +88,49 @@ impl Frame {
     }
 }
 
-/// How far apart the vertices lie that are outermost in the direction `sign` of an axis, across it.
-fn feet(local: &[Vector], axis: usize, sign: f64) -> f64 {
-    let height = |p: &Vector| sign * p[axis];
-    let (low, high) = local
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| {
-            (l.min(height(p)), h.max(height(p)))
-        });
-    let outer: Vec<&Vector> = local
-        .iter()
-        .filter(|p| height(p) > high - 0.06 * (high - low))
-        .collect();
-    let n = outer.len().max(1) as f64;
-    (0..3)
-        .filter(|&k| k != axis)
-        .map(|k| {
-            let mean = outer.iter().map(|p| p[k]).sum::<f64>() / n;
-            outer.iter().map(|p| (p[k] - mean).powi(2)).sum::<f64>() / n
+/// The level directions of most and of least spread.
+fn level(centred: &[Vector], up: &Vector) -> [Vector; 2] {
+    // Any axis that is not upright gives a first level direction.
+    let least = (0..3)
+        .min_by(|&a, &b| up[a].abs().total_cmp(&up[b].abs()))
+        .unwrap_or(0);
+    let first = unit(&cross(
+        up,
+        &std::array::from_fn(|k| f64::from(u8::from(k == least))),
+    ));
+    let second = cross(up, &first);
+    let sum = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
+        centred.iter().map(|p| f(dot(p, &first), dot(p, &second))).sum()
+    };
+    let angle = 0.5 * (2.0 * sum(&|x, y| x * y)).atan2(sum(&|x, y| x * x - y * y));
+    let (sin, cos) = angle.sin_cos();
+    let long: Vector = std::array::from_fn(|k| cos * first[k] + sin * second[k]);
+    [long, cross(up, &long)]
+}
+
+/// How much farther apart the lowest vertices lie than if they filled the range they span evenly: the greater excess of
+/// their variance over range²/12, of the two level directions.
+fn feet(centred: &[Vector], up: &Vector) -> f64 {
+    let range = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+            (l.min(x), h.max(x))
         })
-        .sum()
+    };
+    let (low, high) = range(&mut centred.iter().map(|p| dot(p, up)));
+    let lowest: Vec<&Vector> = centred
+        .iter()
+        .filter(|p| dot(p, up) < low + LOWEST * (high - low))
+        .collect();
+    let n = lowest.len().max(1) as f64;
+    level(centred, up)
+        .iter()
+        .map(|axis| {
+            let (low, high) = range(&mut lowest.iter().map(|p| dot(p, axis)));
+            let mean = lowest.iter().map(|p| dot(p, axis)).sum::<f64>() / n;
+            let variance = lowest.iter().map(|p| (dot(p, axis) - mean).powi(2)).sum::<f64>() / n;
+            variance - (high - low).powi(2) / 12.0
+        })
+        .fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// The triangles that own at least one pixel, the farthest first. `resolution` is the number of pixels per unit.
@@ -172,7 +175,8 @@ fn volume(mesh: &TriMesh) -> f64 {
 
 /// Which faces are nearest to the viewer at some pixel's centre, or at their own.
 fn visible(seen: &[Vector], faces: &[[u32; 3]], resolution: f64) -> Vec<bool> {
-    let bound = |axis: usize, pick: fn(f64, f64) -> f64| seen.iter().map(|p| p[axis]).reduce(pick).unwrap_or(0.0);
+    let bound =
+        |axis: usize, pick: fn(f64, f64) -> f64| seen.iter().map(|p| p[axis]).reduce(pick).unwrap_or(0.0);
     let (left, low) = (bound(0, f64::min), bound(1, f64::min));
     let cells = |from: f64, to: f64| ((to - from) * resolution).clamp(0.0, 2000.0) as usize + 1;
     let (columns, rows) = (cells(left, bound(0, f64::max)), cells(low, bound(1, f64::max)));
@@ -297,7 +301,11 @@ mod tests {
         // Without its lid the inside shows.
         let open = TriMesh::new(
             mesh.vertices().to_vec(),
-            mesh.faces()[..2].iter().chain(&mesh.faces()[4..]).copied().collect(),
+            mesh.faces()[..2]
+                .iter()
+                .chain(&mesh.faces()[4..])
+                .copied()
+                .collect(),
             8,
         )
         .unwrap();

@@ -38,7 +38,8 @@ pub fn deformation_gallery(
     let rows: Vec<GalleryRow> = (0..shown)
         .map(|i| nulls[i * nulls.len() / shown])
         .map(|(class, null)| {
-            let deformed = Deformation::ALL.map(|d| Some(d.apply(null, strength, seed)));
+            let deformed =
+                Deformation::ALL.map(|d| Some(at_its_size(d, null, d.apply(null, strength, seed))));
             GalleryRow {
                 label: class.to_owned(),
                 meshes: std::iter::once(Some(null.clone())).chain(deformed).collect(),
@@ -55,6 +56,29 @@ pub fn deformation_gallery(
             &rows,
         )?,
     })
+}
+
+/// Down-sampling gives a mesh in a unit of its own; it is shown as large as the null.
+fn at_its_size(kind: Deformation, null: &TriangleSoup, mut mesh: TriangleSoup) -> TriangleSoup {
+    if kind == Deformation::Sampling {
+        let factor = diagonal(null) / diagonal(&mesh);
+        if factor.is_finite() {
+            mesh.vertices.iter_mut().flatten().for_each(|x| *x *= factor);
+        }
+    }
+    mesh
+}
+
+/// Of the box around a mesh.
+fn diagonal(mesh: &TriangleSoup) -> f64 {
+    (0..3)
+        .map(|k| {
+            let along = || mesh.vertices.iter().map(|p| p[k]);
+            let low = along().fold(f64::INFINITY, f64::min);
+            (along().fold(f64::NEG_INFINITY, f64::max) - low).powi(2)
+        })
+        .sum::<f64>()
+        .sqrt()
 }
 
 /// Every figure the report has data for: `sdd.svg`, `dissimilarity.svg`, `mds.svg`, `precision_recall.svg`.
@@ -76,7 +100,12 @@ pub fn benchmark_figures(report: &BenchmarkReport) -> Result<Vec<Sheet>, FigureE
         .filter(|c| c.category == TOTAL)
         .map(|c| Series {
             label: spoken(&c.method),
-            points: c.recall.iter().copied().zip(c.precision.iter().copied()).collect(),
+            points: c
+                .recall
+                .iter()
+                .copied()
+                .zip(c.precision.iter().copied())
+                .collect(),
         })
         .collect();
     if !curves.is_empty() {
@@ -105,8 +134,8 @@ fn distance_histograms(all: &[DistanceHistogram]) -> Result<Sheet, FigureError> 
             others: DRAWN
                 .iter()
                 .filter_map(|name| {
-                    let found = of_method()
-                        .find(|h| h.class == null.class && h.category.as_deref() == Some(name))?;
+                    let found =
+                        of_method().find(|h| h.class == null.class && h.category.as_deref() == Some(name))?;
                     Some(histogram(found, &spoken(name)))
                 })
                 .collect(),
@@ -125,24 +154,13 @@ fn distance_histograms(all: &[DistanceHistogram]) -> Result<Sheet, FigureError> 
 
 /// The matrix that says most: of the harder protocol, the default preset, and the mean over all categories.
 fn telling_matrix(all: &[ClassMatrix]) -> Option<ClassMatrix> {
-    let prefer = |wanted: &[&str], of: &dyn Fn(&ClassMatrix) -> String, from: Vec<&ClassMatrix>| {
-        let first = from.first().map(|m| of(m))?;
-        let value = wanted
-            .iter()
-            .find(|w| from.iter().any(|m| of(m) == **w))
-            .map_or(first, |w| (*w).to_owned());
-        Some(
-            from.into_iter()
-                .filter(|m| of(m) == value)
-                .collect::<Vec<_>>(),
-        )
-    };
-    let of_protocol = prefer(&["null", "hold"], &|m| m.protocol.clone(), all.iter().collect())?;
-    let of_method = prefer(&["default", "robust"], &|m| m.method.clone(), of_protocol)?;
+    let all: Vec<&ClassMatrix> = all.iter().collect();
+    let of_protocol = prefer(all, |m| &m.protocol, &["null", "hold"]);
+    let of_method = prefer(of_protocol, |m| &m.method, &["default", "robust"]);
+    let first = *of_method.first()?;
     if let Some(total) = of_method.iter().find(|m| m.category == TOTAL) {
         return Some((*total).clone());
     }
-    let first = of_method[0];
     let same: Vec<&&ClassMatrix> = of_method.iter().filter(|m| m.classes == first.classes).collect();
     let mean = |i: usize, j: usize| {
         let values: Vec<f64> = same
@@ -158,6 +176,24 @@ fn telling_matrix(all: &[ClassMatrix]) -> Option<ClassMatrix> {
         values: (0..n).map(|i| (0..n).map(|j| mean(i, j)).collect()).collect(),
         ..first.clone()
     })
+}
+
+/// Those of one kind: the first of `wanted` that there is, else the first there is.
+fn prefer<'a>(
+    from: Vec<&'a ClassMatrix>,
+    kind: fn(&ClassMatrix) -> &str,
+    wanted: &[&str],
+) -> Vec<&'a ClassMatrix> {
+    let there = |w: &&&str| from.iter().any(|m| kind(m) == **w);
+    let Some(chosen) = wanted
+        .iter()
+        .find(there)
+        .copied()
+        .or(from.first().map(|m| kind(m)))
+    else {
+        return from;
+    };
+    from.iter().copied().filter(|m| kind(m) == chosen).collect()
 }
 
 /// Figure 5.

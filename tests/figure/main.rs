@@ -63,7 +63,9 @@ fn says(svg: &str, labels: &[&str]) {
 
 /// With `SHAPELEX_FIGURES=DIR` the tests leave their figures in DIR, to be looked at.
 fn save(svg: &str) {
-    let Some(dir) = std::env::var_os("SHAPELEX_FIGURES") else { return };
+    let Some(dir) = std::env::var_os("SHAPELEX_FIGURES") else {
+        return;
+    };
     let title = svg.split("<title>").nth(1).unwrap().split('<').next().unwrap();
     let name: String = title.chars().filter(char::is_ascii_alphanumeric).collect();
     std::fs::write(std::path::Path::new(&dir).join(format!("{name}.svg")), svg).unwrap();
@@ -100,7 +102,10 @@ fn a_gallery_shows_every_deformation_and_stays_small() {
     says(&svg, &labels);
     says(&svg, &[&rows[0].label, &rows[3].label]);
     // The same data, the same figure.
-    assert_eq!(gallery("Deformations at strength 4", &columns, &rows).unwrap(), svg);
+    assert_eq!(
+        gallery("Deformations at strength 4", &columns, &rows).unwrap(),
+        svg
+    );
     assert!(matches!(
         gallery("x", &columns[..3], &rows),
         Err(FigureError::Shape {
@@ -109,7 +114,10 @@ fn a_gallery_shows_every_deformation_and_stays_small() {
             ..
         })
     ));
-    assert!(matches!(gallery("x", &columns, &[]), Err(FigureError::Empty { .. })));
+    assert!(matches!(
+        gallery("x", &columns, &[]),
+        Err(FigureError::Empty { .. })
+    ));
 }
 
 #[test]
@@ -143,10 +151,22 @@ fn histograms_name_panels_and_lines() {
         panel("wolf", 33.0),
         panel("man", 55.0),
     ];
-    let svg = histograms("Distances of signatures", "distance of two signatures", 0.8, &panels).unwrap();
+    let svg = histograms(
+        "Distances of signatures",
+        "distance of two signatures",
+        0.8,
+        &panels,
+    )
+    .unwrap();
     says(
         &svg,
-        &["cat", "man", "noise", "holes &amp; &lt;cuts&gt;", "distance of two signatures"],
+        &[
+            "cat",
+            "man",
+            "noise",
+            "holes &amp; &lt;cuts&gt;",
+            "distance of two signatures",
+        ],
     );
     assert!(matches!(
         histograms("x", "y", 1.0, &[]),
@@ -157,7 +177,14 @@ fn histograms_name_panels_and_lines() {
 const CLASSES: [&str; 6] = ["man", "woman", "cat", "lioness", "horse", "elephant"];
 
 fn errors() -> Vec<Vec<f64>> {
-    let places: [[f64; 2]; 6] = [[0.0, 0.0], [0.4, 0.1], [3.0, 1.0], [3.4, 1.5], [2.0, 3.0], [1.0, 4.0]];
+    let places: [[f64; 2]; 6] = [
+        [0.0, 0.0],
+        [0.4, 0.1],
+        [3.0, 1.0],
+        [3.4, 1.5],
+        [2.0, 3.0],
+        [1.0, 4.0],
+    ];
     (0..6)
         .map(|i| {
             (0..6)
@@ -236,10 +263,7 @@ fn an_embedding_names_its_points() {
     let svg = embedding("Shapes in the plane", "units", &many).unwrap();
     says(&svg, &CLASSES);
     assert!(!svg.contains(">shape3<"));
-    assert!(matches!(
-        embedding("x", "y", &[]),
-        Err(FigureError::Empty { .. })
-    ));
+    assert!(matches!(embedding("x", "y", &[]), Err(FigureError::Empty { .. })));
 }
 
 #[test]
@@ -294,6 +318,9 @@ fn bars_carry_their_values() {
             value: 0.377 + 0.01 * i as f64,
         })
         .collect();
-    says(&bars("cat3.off", "mean objective", &list).unwrap(), &["man", "0.37700", "0.42700"]);
+    says(
+        &bars("cat3.off", "mean objective", &list).unwrap(),
+        &["man", "0.37700", "0.42700"],
+    );
     assert!(matches!(bars("x", "y", &[]), Err(FigureError::Empty { .. })));
 }
