@@ -90,7 +90,7 @@ pub fn embedding(title: &str, unit: &str, points: &[EmbeddedPoint]) -> Result<St
 }
 
 /// A box in pixels: left, top, right, bottom.
-type Box = [f64; 4];
+type Bounds = [f64; 4];
 
 /// Writes each name at the one of eight places around its mark that covers least of what is there already.
 fn name_points(
@@ -100,7 +100,7 @@ fn name_points(
     kind: &dyn Fn(&EmbeddedPoint) -> usize,
 ) -> Result<(), FigureError> {
     let pixel = |v: i32| f64::from(v) / f64::from(UNIT);
-    let mut taken: Vec<Box> = places
+    let mut taken: Vec<Bounds> = places
         .iter()
         .map(|&(x, y)| [pixel(x) - 5.0, pixel(y) - 5.0, pixel(x) + 5.0, pixel(y) + 5.0])
         .collect();
@@ -120,7 +120,7 @@ fn name_points(
             (x - 5.0, y - rise, HPos::Right),
             (x - 5.0, y + rise, HPos::Right),
         ];
-        let bounds = |(x, y, anchor): (f64, f64, HPos)| -> Box {
+        let bounds = |(x, y, anchor): (f64, f64, HPos)| -> Bounds {
             let left = match anchor {
                 HPos::Left => x,
                 HPos::Center => x - width / 2.0,
@@ -146,7 +146,7 @@ fn name_points(
 }
 
 /// Area two boxes share.
-fn overlap(a: &Box, b: &Box) -> f64 {
+fn overlap(a: &Bounds, b: &Bounds) -> f64 {
     let across = a[2].min(b[2]) - a[0].max(b[0]);
     let down = a[3].min(b[3]) - a[1].max(b[1]);
     across.max(0.0) * down.max(0.0)

@@ -80,6 +80,28 @@ pub fn gallery(title: &str, columns: &[String], rows: &[GalleryRow]) -> Result<S
     })
 }
 
+/// The mesh scaled so that the box around it has the diagonal of the other's: what came out of a step that changes the
+/// unit is shown beside what went in.
+pub fn as_large_as(other: &TriangleSoup, mut mesh: TriangleSoup) -> TriangleSoup {
+    let factor = diagonal(other) / diagonal(&mesh);
+    if factor.is_finite() {
+        mesh.vertices.iter_mut().flatten().for_each(|x| *x *= factor);
+    }
+    mesh
+}
+
+/// Of the box around a mesh.
+fn diagonal(mesh: &TriangleSoup) -> f64 {
+    (0..3)
+        .map(|k| {
+            let along = || mesh.vertices.iter().map(|p| p[k]);
+            let low = along().fold(f64::INFINITY, f64::min);
+            (along().fold(f64::NEG_INFINITY, f64::max) - low).powi(2)
+        })
+        .sum::<f64>()
+        .sqrt()
+}
+
 /// Draws one mesh around a place in pixels. `view` is the row's frame and pixels per unit, chosen by its first mesh.
 fn draw_mesh(
     root: &canvas::Area<'_>,

@@ -23,7 +23,7 @@ pub use bars::{Bar, bars};
 pub use cost::{CostAxes, PowerLaw, cost_curves, fit_power_law};
 pub use embedding::{EmbeddedPoint, embedding};
 pub use error::FigureError;
-pub use gallery::{GalleryRow, gallery};
+pub use gallery::{GalleryRow, as_large_as, gallery};
 pub use heat_map::{HeatMap, heat_map};
 pub use histogram::{Histogram, HistogramPanel, histograms};
 pub use mds::{Embedding, between_classes, classical_mds};

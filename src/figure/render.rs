@@ -136,7 +136,7 @@ fn feet(centred: &[Vector], up: &Vector) -> f64 {
 /// The triangles that own at least one pixel, the farthest first. `resolution` is the number of pixels per unit.
 pub(super) fn facets(mesh: &TriMesh, frame: &Frame, resolution: f64) -> Vec<Facet> {
     let seen: Vec<Vector> = mesh.vertices().iter().map(|p| frame.see(p)).collect();
-    let open = !boundary_vertices(mesh).is_empty();
+    let open = boundary_vertices(mesh).contains(&true);
     let outward = if volume(mesh) < 0.0 { -1.0 } else { 1.0 };
     let visible = visible(&seen, mesh.faces(), resolution);
     let mut found: Vec<(f64, Facet)> = mesh

@@ -1,8 +1,8 @@
 //! The figures of a robustness benchmark: the paper's Figures 3 to 6, and precision over recall.
 
 use super::{
-    EmbeddedPoint, FigureError, GalleryRow, HeatMap, Histogram, HistogramPanel, Series, between_classes,
-    classical_mds, embedding, gallery, heat_map, histograms, precision_recall,
+    EmbeddedPoint, FigureError, GalleryRow, HeatMap, Histogram, HistogramPanel, Series, as_large_as,
+    between_classes, classical_mds, embedding, gallery, heat_map, histograms, precision_recall,
 };
 use crate::benchmark::deform::Deformation;
 use crate::benchmark::report::{BenchmarkReport, ClassMatrix, DistanceHistogram, TOTAL};
@@ -19,7 +19,7 @@ const DRAWN: [&str; 3] = ["noise", "holes", "view"];
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sheet {
     /// Such as `mds.svg`.
-    pub name: &'static str,
+    pub name: String,
     /// The SVG document.
     pub svg: String,
 }
@@ -38,8 +38,14 @@ pub fn deformation_gallery(
     let rows: Vec<GalleryRow> = (0..shown)
         .map(|i| nulls[i * nulls.len() / shown])
         .map(|(class, null)| {
-            let deformed =
-                Deformation::ALL.map(|d| Some(at_its_size(d, null, d.apply(null, strength, seed))));
+            let deformed = Deformation::ALL.map(|kind| {
+                let mesh = kind.apply(null, strength, seed);
+                // Down-sampling gives a mesh in a unit of its own.
+                Some(match kind {
+                    Deformation::Sampling => as_large_as(null, mesh),
+                    _ => mesh,
+                })
+            });
             GalleryRow {
                 label: class.to_owned(),
                 meshes: std::iter::once(Some(null.clone())).chain(deformed).collect(),
@@ -49,36 +55,13 @@ pub fn deformation_gallery(
     let mut columns = vec!["null".to_owned()];
     columns.extend(Deformation::ALL.map(|d| spoken(d.name())));
     Ok(Sheet {
-        name: "gallery.svg",
+        name: "gallery.svg".to_owned(),
         svg: gallery(
             &format!("Null shapes and their deformations at strength {strength}"),
             &columns,
             &rows,
         )?,
     })
-}
-
-/// Down-sampling gives a mesh in a unit of its own; it is shown as large as the null.
-fn at_its_size(kind: Deformation, null: &TriangleSoup, mut mesh: TriangleSoup) -> TriangleSoup {
-    if kind == Deformation::Sampling {
-        let factor = diagonal(null) / diagonal(&mesh);
-        if factor.is_finite() {
-            mesh.vertices.iter_mut().flatten().for_each(|x| *x *= factor);
-        }
-    }
-    mesh
-}
-
-/// Of the box around a mesh.
-fn diagonal(mesh: &TriangleSoup) -> f64 {
-    (0..3)
-        .map(|k| {
-            let along = || mesh.vertices.iter().map(|p| p[k]);
-            let low = along().fold(f64::INFINITY, f64::min);
-            (along().fold(f64::NEG_INFINITY, f64::max) - low).powi(2)
-        })
-        .sum::<f64>()
-        .sqrt()
 }
 
 /// Every figure the report has data for: `sdd.svg`, `dissimilarity.svg`, `mds.svg`, `precision_recall.svg`.
@@ -110,7 +93,7 @@ pub fn benchmark_figures(report: &BenchmarkReport) -> Result<Vec<Sheet>, FigureE
         .collect();
     if !curves.is_empty() {
         sheets.push(Sheet {
-            name: "precision_recall.svg",
+            name: "precision_recall.svg".to_owned(),
             svg: precision_recall("Retrieval of nulls and their deformations", &curves)?,
         });
     }
@@ -142,7 +125,7 @@ fn distance_histograms(all: &[DistanceHistogram]) -> Result<Sheet, FigureError> 
         })
         .collect();
     Ok(Sheet {
-        name: "sdd.svg",
+        name: "sdd.svg".to_owned(),
         svg: histograms(
             "Distances between signatures: nulls (areas) and deformations (lines)",
             "distance of two signatures",
@@ -212,7 +195,7 @@ fn dissimilarity(matrix: &ClassMatrix) -> Result<Sheet, FigureError> {
         matrix.protocol
     );
     Ok(Sheet {
-        name: "dissimilarity.svg",
+        name: "dissimilarity.svg".to_owned(),
         svg: heat_map(&title, &map)?,
     })
 }
@@ -237,7 +220,7 @@ fn class_embedding(matrix: &ClassMatrix) -> Result<Sheet, FigureError> {
         100.0 * embedded.explained
     );
     Ok(Sheet {
-        name: "mds.svg",
+        name: "mds.svg".to_owned(),
         svg: embedding(&title, "root of the score", &points)?,
     })
 }

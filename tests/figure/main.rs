@@ -324,3 +324,72 @@ fn bars_carry_their_values() {
     );
     assert!(matches!(bars("x", "y", &[]), Err(FigureError::Empty { .. })));
 }
+
+#[test]
+fn a_report_gives_the_papers_figures() {
+    use shapelex::benchmark::report::{
+        BenchmarkReport, ClassMatrix, DistanceHistogram, PrecisionRecall, TOTAL,
+    };
+    use shapelex::figure::{benchmark_figures, deformation_gallery};
+
+    let histogram = |category: Option<&str>| DistanceHistogram {
+        method: "sdd_wks".to_owned(),
+        class: "cat".to_owned(),
+        category: category.map(str::to_owned),
+        largest: 0.5,
+        shares: vec![0.25; 4],
+    };
+    let matrix = |method: &str, category: &str, offset: f64| ClassMatrix {
+        protocol: "null".to_owned(),
+        method: method.to_owned(),
+        category: category.to_owned(),
+        classes: names(&CLASSES),
+        values: errors()
+            .iter()
+            .map(|row| row.iter().map(|v| v + offset).collect())
+            .collect(),
+    };
+    let report = BenchmarkReport {
+        histograms: vec![histogram(None), histogram(Some("view")), histogram(Some("scale"))],
+        dissimilarity: vec![
+            matrix("shape_dna", "noise", 5.0),
+            matrix("default", "noise", 0.0),
+            matrix("default", "shot_noise", 0.2),
+        ],
+        precision_recall: vec![PrecisionRecall {
+            method: "bow_si_hks".to_owned(),
+            category: TOTAL.to_owned(),
+            recall: vec![0.0, 0.5, 1.0],
+            precision: vec![1.0, 0.8, 0.3],
+        }],
+        ..BenchmarkReport::default()
+    };
+    let sheets = benchmark_figures(&report).unwrap();
+    let files: Vec<&str> = sheets.iter().map(|s| s.name.as_str()).collect();
+    assert_eq!(
+        files,
+        ["sdd.svg", "dissimilarity.svg", "mds.svg", "precision_recall.svg"]
+    );
+    says(&sheets[0].svg, &["cat", "view"]);
+    // The mean over the categories of the default preset: 0.377 + 0.1 on the diagonal.
+    says(&sheets[1].svg, &["elephant", "0.4770"]);
+    says(&sheets[2].svg, &CLASSES);
+    says(&sheets[3].svg, &["bow si hks"]);
+    assert_eq!(benchmark_figures(&BenchmarkReport::default()).unwrap(), []);
+
+    let options = ZooOptions {
+        upright: true,
+        min_vertices: 300,
+        max_vertices: 400,
+    };
+    let nulls: Vec<_> = species(1, 6)
+        .iter()
+        .map(|kind| (kind.name().to_owned(), kind.pose(1, 0, &options).unwrap()))
+        .collect();
+    let named: Vec<_> = nulls.iter().map(|(name, mesh)| (name.as_str(), mesh)).collect();
+    let sheet = deformation_gallery(&named, 3, 1).unwrap();
+    assert_eq!(sheet.name, "gallery.svg");
+    // Four of the six, evenly spread.
+    says(&sheet.svg, &[named[0].0, named[1].0, named[3].0, named[4].0, "shot noise"]);
+    assert!(!sheet.svg.contains(&format!(">\n{}\n<", named[2].0)));
+}
