@@ -28,7 +28,7 @@ pub use heat_map::{HeatMap, heat_map};
 pub use histogram::{Histogram, HistogramPanel, histograms};
 pub use mds::{Embedding, between_classes, classical_mds};
 pub use precision_recall::precision_recall;
-pub use results::{Sheet, benchmark_figures, deformation_gallery};
+pub use results::{Sheet, benchmark_figures, deformation_gallery, evaluation_figures};
 
 /// A named series of points (x, y).
 #[derive(Clone, Debug, PartialEq)]

@@ -4,9 +4,11 @@ use super::{
     EmbeddedPoint, FigureError, GalleryRow, HeatMap, Histogram, HistogramPanel, Series, as_large_as,
     between_classes, classical_mds, embedding, gallery, heat_map, histograms, precision_recall,
 };
+use crate::benchmark::Evaluation;
 use crate::benchmark::deform::Deformation;
 use crate::benchmark::report::{BenchmarkReport, ClassMatrix, DistanceHistogram, TOTAL};
 use crate::mesh::TriangleSoup;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Rows of the gallery at most: more make each mesh coarser.
 const GALLERY_ROWS: usize = 4;
@@ -24,22 +26,23 @@ pub struct Sheet {
     pub svg: String,
 }
 
-/// The paper's Figure 3: null shapes with their classes, each with its nine deformations at a strength from 1 to 5. Of
-/// more than four nulls, four evenly spread are shown.
+/// The paper's Figure 3: null shapes with their classes, each with its nine deformations, which `deform` makes of the
+/// null at a place of the list. Of more than four nulls, four evenly spread are shown.
 ///
 /// # Errors
 /// As [`gallery`].
 pub fn deformation_gallery(
     nulls: &[(&str, &TriangleSoup)],
     strength: u32,
-    seed: u64,
+    deform: &dyn Fn(usize, Deformation) -> Option<TriangleSoup>,
 ) -> Result<Sheet, FigureError> {
     let shown = nulls.len().min(GALLERY_ROWS);
     let rows: Vec<GalleryRow> = (0..shown)
-        .map(|i| nulls[i * nulls.len() / shown])
-        .map(|(class, null)| {
+        .map(|i| i * nulls.len() / shown)
+        .map(|at| {
+            let (class, null) = nulls[at];
             let deformed = Deformation::ALL.map(|kind| {
-                let mesh = kind.apply(null, strength, seed);
+                let mesh = deform(at, kind)?;
                 // Down-sampling gives a mesh in a unit of its own.
                 Some(match kind {
                     Deformation::Sampling => as_large_as(null, mesh),
@@ -96,6 +99,74 @@ pub fn benchmark_figures(report: &BenchmarkReport) -> Result<Vec<Sheet>, FigureE
             name: "precision_recall.svg".to_owned(),
             svg: precision_recall("Retrieval of nulls and their deformations", &curves)?,
         });
+    }
+    Ok(sheets)
+}
+
+/// Three figures of an evaluation, named after its protocol: who was taken for whom, the dissimilarity of the classes,
+/// and, where every class was compared with every other, the classes in the plane.
+///
+/// # Errors
+/// The first figure's that cannot be drawn; [`FigureError::Empty`] without queries.
+pub fn evaluation_figures(evaluation: &Evaluation) -> Result<Vec<Sheet>, FigureError> {
+    let protocol = evaluation.protocol.name();
+    let classes: Vec<String> = evaluation
+        .queries
+        .iter()
+        .flat_map(|q| q.ranked.iter().map(|(class, _)| class).chain([&q.class]))
+        .collect::<BTreeSet<_>>()
+        .into_iter()
+        .cloned()
+        .collect();
+    let place: BTreeMap<&str, usize> = classes.iter().enumerate().map(|(i, c)| (c.as_str(), i)).collect();
+    let zeros = || vec![vec![0.0; classes.len()]; classes.len()];
+    let (mut answers, mut sums, mut counts) = (zeros(), zeros(), zeros());
+    for query in &evaluation.queries {
+        let row = place[query.class.as_str()];
+        for (rank, (class, score)) in query.ranked.iter().enumerate() {
+            let column = place[class.as_str()];
+            sums[row][column] += score;
+            counts[row][column] += 1.0;
+            if rank == 0 {
+                answers[row][column] += 1.0;
+            }
+        }
+    }
+    let confusion = HeatMap {
+        row_axis: "true class",
+        column_axis: "answered class",
+        value: "queries",
+        rows: &classes,
+        columns: &classes,
+        values: &answers,
+    };
+    let title = format!(
+        "Answers of {protocol}: {} of {} right",
+        evaluation.correct, evaluation.total
+    );
+    let matrix = ClassMatrix {
+        protocol: protocol.to_owned(),
+        method: "queries".to_owned(),
+        category: TOTAL.to_owned(),
+        values: sums
+            .iter()
+            .zip(&counts)
+            .map(|(s, n)| s.iter().zip(n).map(|(s, n)| s / n).collect())
+            .collect(),
+        classes: classes.clone(),
+    };
+    let mut sheets = vec![
+        Sheet {
+            name: "confusion.svg".to_owned(),
+            svg: heat_map(&title, &confusion)?,
+        },
+        dissimilarity(&matrix)?,
+    ];
+    if matrix.values.iter().flatten().all(|v| v.is_finite()) {
+        sheets.push(class_embedding(&matrix)?);
+    }
+    for sheet in &mut sheets {
+        sheet.name = format!("{}-{}", protocol.replace('/', "-"), sheet.name);
     }
     Ok(sheets)
 }

@@ -326,6 +326,59 @@ fn bars_carry_their_values() {
 }
 
 #[test]
+fn an_evaluation_gives_confusion_dissimilarity_and_embedding() {
+    use shapelex::benchmark::{Evaluation, Protocol, QueryResult};
+    use shapelex::figure::evaluation_figures;
+
+    let queries: Vec<QueryResult> = errors()
+        .iter()
+        .enumerate()
+        .map(|(i, row)| {
+            let mut ranked: Vec<(String, f64)> =
+                names(&CLASSES).into_iter().zip(row.iter().copied()).collect();
+            ranked.sort_by(|a, b| a.1.total_cmp(&b.1));
+            QueryResult {
+                class: CLASSES[i].to_owned(),
+                name: "0".to_owned(),
+                ranked,
+                correct: true,
+                true_rank: 1,
+                error_margin: -0.1,
+            }
+        })
+        .collect();
+    let mut evaluation = Evaluation {
+        protocol: Protocol::EvenOdd,
+        correct: 6,
+        total: 6,
+        queries,
+        confusion: std::collections::BTreeMap::new(),
+        not_queried: 0,
+    };
+    let sheets = evaluation_figures(&evaluation).unwrap();
+    let files: Vec<&str> = sheets.iter().map(|s| s.name.as_str()).collect();
+    assert_eq!(
+        files,
+        [
+            "even-odd-confusion.svg",
+            "even-odd-dissimilarity.svg",
+            "even-odd-mds.svg"
+        ]
+    );
+    says(
+        &sheets[0].svg,
+        &["Answers of even/odd: 6 of 6 right", "elephant", "1"],
+    );
+    says(&sheets[1].svg, &["0.3770"]);
+    says(&sheets[2].svg, &CLASSES);
+    // A class that some were not compared with leaves a gap, and no plane.
+    evaluation.queries[0].ranked.truncate(3);
+    assert_eq!(evaluation_figures(&evaluation).unwrap().len(), 2);
+    evaluation.queries.clear();
+    assert!(evaluation_figures(&evaluation).is_err());
+}
+
+#[test]
 fn a_report_gives_the_papers_figures() {
     use shapelex::benchmark::report::{
         BenchmarkReport, ClassMatrix, DistanceHistogram, PrecisionRecall, TOTAL,
@@ -387,9 +440,12 @@ fn a_report_gives_the_papers_figures() {
         .map(|kind| (kind.name().to_owned(), kind.pose(1, 0, &options).unwrap()))
         .collect();
     let named: Vec<_> = nulls.iter().map(|(name, mesh)| (name.as_str(), mesh)).collect();
-    let sheet = deformation_gallery(&named, 3, 1).unwrap();
+    let sheet = deformation_gallery(&named, 3, &|at, kind| Some(kind.apply(named[at].1, 3, 1))).unwrap();
     assert_eq!(sheet.name, "gallery.svg");
     // Four of the six, evenly spread.
-    says(&sheet.svg, &[named[0].0, named[1].0, named[3].0, named[4].0, "shot noise"]);
+    says(
+        &sheet.svg,
+        &[named[0].0, named[1].0, named[3].0, named[4].0, "shot noise"],
+    );
     assert!(!sheet.svg.contains(&format!(">\n{}\n<", named[2].0)));
 }
