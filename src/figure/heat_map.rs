@@ -97,6 +97,7 @@ pub fn heat_map(title: &str, map: &HeatMap<'_>) -> Result<String, FigureError> {
         let axis = font(13.0, MUTED, HPos::Center, VPos::Center);
         canvas::write(root, map.column_axis, (left + across / 2.0, 54.0), &axis)?;
         canvas::write(root, map.row_axis, (14.0, top + down / 2.0), &upwards(&axis))?;
+        let whole = finite().all(|v| v == v.round() && v.abs() < 1e6);
         let written = r.max(c) <= WRITTEN;
         for (i, row) in map.values.iter().enumerate() {
             for (j, &v) in row.iter().enumerate() {
@@ -111,10 +112,10 @@ pub fn heat_map(title: &str, map: &HeatMap<'_>) -> Result<String, FigureError> {
                 fill(root, at, (cell - gap, cell - gap), colour)?;
                 if written {
                     let style = font(cell * 0.25, ink_on(colour), HPos::Center, VPos::Center);
-                    let text = if v.is_finite() {
-                        cell_text(v, least, greatest)
-                    } else {
-                        "–".to_owned()
+                    let text = match v.is_finite() {
+                        true if whole => format!("{v:.0}"),
+                        true => cell_text(v, greatest - least),
+                        false => "–".to_owned(),
                     };
                     let middle = (at.0 + (cell - gap) / 2.0, at.1 + (cell - gap) / 2.0);
                     canvas::write(root, &text, middle, &style)?;
@@ -125,13 +126,9 @@ pub fn heat_map(title: &str, map: &HeatMap<'_>) -> Result<String, FigureError> {
     })
 }
 
-/// Whole numbers as they are; others with as many decimals as tell the ends of the range apart by a hundredth.
-fn cell_text(v: f64, least: f64, greatest: f64) -> String {
-    if v == v.round() && v.abs() < 1e5 && (greatest - least) >= 2.0 {
-        return format!("{v:.0}");
-    }
-    let range = (greatest - least).max(f64::MIN_POSITIVE);
-    let decimals = (2.0 - range.log10().floor()).clamp(0.0, 4.0) as usize;
+/// A number with as many decimals as tell a hundredth of the range.
+fn cell_text(v: f64, range: f64) -> String {
+    let decimals = (2.0 - range.max(f64::MIN_POSITIVE).log10().floor()).clamp(0.0, 4.0) as usize;
     format!("{v:.decimals$}")
 }
 
