@@ -5,15 +5,17 @@ use super::dto::class::ClassRef;
 use super::dto::query::{QueryAnswer, QueryOptions, RankedClass, RankedShape};
 use super::metrics;
 use super::problem::{Code, Problem};
-use super::problem_from::index_empty;
+use super::problem_from::{baselines_missing, index_empty};
+use super::ranked::Ranked;
 use super::state::Parts;
 use super::time_limit::{TimeView, rank_until};
 use super::uploaded::UploadedMesh;
+use crate::baseline::baseline_parameters;
 use crate::jobs::LiveIndex;
 use crate::mesh::TriangleSoup;
 use crate::model::ClassId;
 use crate::parameters::Parameters;
-use crate::pipeline::{Stage, describe_query, rank};
+use crate::pipeline::{Stage, describe_query, describe_shape, rank};
 use crate::ranking::Index;
 use crate::spectral;
 use crate::store::StoreError;
@@ -24,7 +26,7 @@ use std::time::{Duration, Instant};
 /// Answers a query. Blocks on the computation: call it on the compute pool.
 ///
 /// # Errors
-/// `index_empty`, and those of reading, describing and ranking.
+/// `index_empty`, `baselines_missing`, and those of reading, describing and ranking.
 pub fn answer(
     state: &Parts,
     live: &LiveIndex,
@@ -55,15 +57,36 @@ pub fn answer(
         Some(limit) if problem.code == Code::Cancelled => limit.nothing_scored(),
         _ => problem,
     };
-    let description = describe_query(soup, parameters, stop, &observer).map_err(|e| timely(e.into()))?;
-    drop(reading);
-    observer(Stage::Ranking);
-    let rank_by = options.rank_by.map_or(parameters.rank_by, Into::into);
-    let ranked = match limit {
-        Some(_) => rank_until(&description.views, &index, rank_by, stop),
-        None => rank(&description.views, &index, rank_by, stop).map(|ranking| (ranking, Vec::new())),
+    let named = options.rank_by.unwrap_or(parameters.rank_by.into());
+    let (description, ranking, left) = match named.method() {
+        Ok(rank_by) => {
+            let description =
+                describe_query(soup, parameters, stop, &observer).map_err(|e| timely(e.into()))?;
+            observer(Stage::Ranking);
+            let ranked = match limit {
+                Some(_) => rank_until(&description.views, &index, rank_by, stop),
+                None => rank(&description.views, &index, rank_by, stop).map(|ranking| (ranking, Vec::new())),
+            };
+            let (ranking, left) = ranked.map_err(|e| timely(e.into()))?;
+            (description, Ranked::from(ranking), left)
+        }
+        Err(baseline) => {
+            let baselines = live
+                .baselines
+                .as_ref()
+                .ok_or_else(|| baselines_missing(named.name()))?;
+            let parameters = baseline_parameters(parameters);
+            let description =
+                describe_shape(soup, &parameters, stop, &observer).map_err(|e| timely(e.into()))?;
+            observer(Stage::Ranking);
+            let present = |label: &str| names.contains_key(label);
+            let nearest = baselines
+                .nearest(&description, baseline, &present)
+                .ok_or_else(|| baselines_missing(named.name()))?;
+            (description, Ranked::from(nearest), Vec::new())
+        }
     };
-    let (ranking, left) = ranked.map_err(|e| timely(e.into()))?;
+    drop(reading);
     let stages = watch.end();
     for (stage, took) in &stages {
         metrics::time_stage(*stage, *took);
@@ -74,23 +97,21 @@ pub fn answer(
     };
     let top = options.top.unwrap_or(usize::MAX);
     let compared = ranking.classes.len();
-    let classes = ranking
-        .classes
-        .into_iter()
-        .take(top)
-        .enumerate()
-        .map(|(i, c)| RankedClass {
+    let classes = ranking.classes.into_iter().take(top).enumerate().map(|(i, c)| {
+        let coded = c.coded;
+        RankedClass {
             rank: i + 1,
             class: class_of(&c.label),
             score: c.score,
-            reconstruction_error: c.frobenius_error,
-            relative_error: c.relative_error,
-            mean_objective: c.mean_objective,
-            trimmed_objective: c.trimmed_objective,
-            mean_nonzeros: c.mean_nonzeros,
-            hypothesis: c.hypothesis.into(),
+            reconstruction_error: coded.as_ref().map(|c| c.frobenius_error),
+            relative_error: coded.as_ref().map(|c| c.relative_error),
+            mean_objective: coded.as_ref().map(|c| c.mean_objective),
+            trimmed_objective: coded.as_ref().map(|c| c.trimmed_objective),
+            mean_nonzeros: coded.as_ref().map(|c| c.mean_nonzeros),
+            hypothesis: coded.as_ref().map(|c| c.hypothesis.into()),
             margin: c.margin,
-        });
+        }
+    });
     let shapes = ranking
         .shapes
         .into_iter()
@@ -117,7 +138,7 @@ pub fn answer(
         mesh: description.report.into(),
         eigenvalues: description.eigenvalues,
         generation: generation.number,
-        rank_by: rank_by.into(),
+        rank_by: named,
         parameters: parameters.clone().into(),
         timings_ms: timings(&stages, work.waited, began.elapsed()),
     })

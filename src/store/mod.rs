@@ -11,6 +11,7 @@
 
 mod api_keys;
 pub mod backend;
+mod baselines;
 mod catalogue;
 mod catalogue_log;
 mod dictionaries;

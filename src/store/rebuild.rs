@@ -17,8 +17,9 @@ use std::path::Path;
 const CHUNK: usize = 256;
 
 /// Families the log cannot give back; their intact records are carried over.
-const CARRIED: [&[u8]; 6] = [
+const CARRIED: [&[u8]; 7] = [
     keys::DICTIONARY,
+    keys::BASELINE,
     keys::GENERATION,
     keys::JOB,
     keys::QUEUE,

@@ -50,6 +50,10 @@ pub enum Family {
     ApiKey = 13,
     /// A request that was answered with a job.
     Idempotency = 14,
+    /// What the baselines' descriptors of a generation share.
+    BaselineModel = 15,
+    /// The baselines' descriptors of a class's shapes.
+    Baselines = 16,
 }
 
 /// A value with a family, a version and an encoding.
