@@ -162,7 +162,7 @@ impl Settings {
 /// A sentence with the names there are.
 pub fn parse_preset(text: &str) -> Result<Preset, String> {
     serde_json::from_value(serde_json::Value::String(text.to_owned()))
-        .map_err(|_| "expected default, paper or robust".to_owned())
+        .map_err(|_| "expected default, paper, robust or fast".to_owned())
 }
 
 /// The parser's message with the line it is about, on one line.

@@ -53,8 +53,11 @@ pub fn upload(
 ///
 /// # Errors
 /// As [`upload`].
-pub fn query(client: &Client, file: MeshFile) -> Result<Value, CallError> {
-    let path = format!("/v1/query?name={}", encode(&file.name));
+pub fn query(client: &Client, file: MeshFile, top: Option<usize>) -> Result<Value, CallError> {
+    let mut path = format!("/v1/query?name={}", encode(&file.name));
+    if let Some(top) = top {
+        path += &format!("&top={top}");
+    }
     client.call("POST", &path, mesh_payload(file))
 }
 

@@ -6,7 +6,7 @@ use super::refused::Refused;
 use super::{CliError, api, dictionaries, output};
 use crate::cancel::Cancel;
 use crate::mesh::{Limits, read};
-use crate::pipeline::{describe_query, rank};
+use crate::pipeline::{describe_query, rank_top};
 use crate::ranking::Index;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -72,24 +72,21 @@ impl Source {
     fn rank(&self, path: &Path, top: usize) -> Result<Value, CliError> {
         let limits = Limits::default();
         let file = MeshFile::load(path, limits.max_bytes)?;
-        let mut answer = match self {
-            Self::Service(client) => api::query(client, file)?,
-            Self::File(index) => rank_against(index, &file, &limits)?,
+        let answer = match self {
+            Self::Service(client) => api::query(client, file, Some(top))?,
+            Self::File(index) => rank_against(index, &file, top, &limits)?,
         };
-        if let Some(classes) = answer["classes"].as_array_mut() {
-            classes.truncate(top);
-        }
         Ok(answer)
     }
 }
 
 /// The same stages as the service's query, on an index that came out of a file. The answer has the members of the
 /// API's answer that have a meaning without a service.
-fn rank_against(index: &Index, file: &MeshFile, limits: &Limits) -> Result<Value, CliError> {
+fn rank_against(index: &Index, file: &MeshFile, top: usize, limits: &Limits) -> Result<Value, CliError> {
     let cancel = Cancel::new();
     let (format, soup) = read(&file.source(), limits)?;
     let description = describe_query(soup, &index.parameters, &cancel, &|_| ())?;
-    let ranking = rank(&description.views, index, index.parameters.rank_by, &cancel)
+    let ranking = rank_top(&description.views, index, index.parameters.rank_by, top, &cancel)
         .map_err(crate::pipeline::PipelineError::from)?;
     let classes: Vec<Value> = ranking
         .classes
@@ -114,7 +111,8 @@ fn rank_against(index: &Index, file: &MeshFile, limits: &Limits) -> Result<Value
         "name": file.name,
         "classes": classes,
         "confidence": ranking.confidence,
-        "compared": ranking.classes.len(),
+        "compared": ranking.compared,
+        "pruned": ranking.pruned,
         "signatures": ranking.signatures,
         "format": format,
         "warnings": description.report.warnings,

@@ -10,7 +10,7 @@ use super::state::Parts;
 use super::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
 use crate::model::ClassId;
-use crate::pipeline::{Stage, describe_query, rank};
+use crate::pipeline::{Stage, describe_query, rank, rank_top};
 use crate::ranking::Index;
 use crate::store::StoreError;
 use std::cell::RefCell;
@@ -45,7 +45,11 @@ pub fn answer(
     let description = describe_query(soup, parameters, &work.cancel, &observer)?;
     observer(Stage::Ranking);
     let rank_by = options.rank_by.map_or(parameters.rank_by, Into::into);
-    let ranking = rank(&description.views, &index, rank_by, &work.cancel)?;
+    let views = &description.views;
+    let ranking = match options.top {
+        Some(top) => rank_top(views, &index, rank_by, top, &work.cancel)?,
+        None => rank(views, &index, rank_by, &work.cancel)?,
+    };
     let stages = watch.end();
     for (stage, took) in &stages {
         metrics::time_stage(*stage, *took);
@@ -54,43 +58,32 @@ pub fn answer(
         id: label.to_owned(),
         name: names.get(label).cloned().unwrap_or_else(|| label.to_owned()),
     };
-    let top = options.top.unwrap_or(usize::MAX);
-    let compared = ranking.classes.len();
-    let classes = ranking
-        .classes
-        .into_iter()
-        .take(top)
-        .enumerate()
-        .map(|(i, c)| RankedClass {
-            rank: i + 1,
-            class: class_of(&c.label),
-            score: c.score,
-            reconstruction_error: c.frobenius_error,
-            relative_error: c.relative_error,
-            mean_objective: c.mean_objective,
-            trimmed_objective: c.trimmed_objective,
-            mean_nonzeros: c.mean_nonzeros,
-            hypothesis: c.hypothesis.into(),
-            margin: c.margin,
-        });
-    let shapes = ranking
-        .shapes
-        .into_iter()
-        .take(top)
-        .enumerate()
-        .map(|(i, s)| RankedShape {
-            rank: i + 1,
-            shape: s.label,
-            class: class_of(&s.class),
-            score: s.score,
-            reconstruction_error: s.frobenius_error,
-        });
+    let classes = ranking.classes.into_iter().enumerate().map(|(i, c)| RankedClass {
+        rank: i + 1,
+        class: class_of(&c.label),
+        score: c.score,
+        reconstruction_error: c.frobenius_error,
+        relative_error: c.relative_error,
+        mean_objective: c.mean_objective,
+        trimmed_objective: c.trimmed_objective,
+        mean_nonzeros: c.mean_nonzeros,
+        hypothesis: c.hypothesis.into(),
+        margin: c.margin,
+    });
+    let shapes = ranking.shapes.into_iter().enumerate().map(|(i, s)| RankedShape {
+        rank: i + 1,
+        shape: s.label,
+        class: class_of(&s.class),
+        score: s.score,
+        reconstruction_error: s.frobenius_error,
+    });
     Ok(QueryAnswer {
         name: mesh.name.clone(),
         classes: classes.collect(),
         nearest_shapes: shapes.collect(),
         confidence: ranking.confidence,
-        compared,
+        compared: ranking.compared,
+        pruned: ranking.pruned,
         signatures: ranking.signatures,
         format: format.extension().to_owned(),
         warnings: description.report.warnings.clone(),
