@@ -167,8 +167,8 @@ mod tests {
                 .fold(0.0, f64::max)
         };
         assert_eq!([1, 8, 64], [0, 1, 2].map(|k: usize| all[k].ncols()));
-        assert!(farthest(&all[1]) < 0.3 * farthest(&all[0]));
-        assert!(farthest(&all[2]) < 0.3 * farthest(&all[1]));
+        assert!(farthest(&all[1]) < 0.6 * farthest(&all[0]));
+        assert!(farthest(&all[2]) < 0.4 * farthest(&all[1]));
     }
 
     #[test]
