@@ -70,9 +70,9 @@ fn mixture(signal: &Summary, points: &[Summary]) -> Vec<(usize, f64)> {
     nearest.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let offset = |a: usize, k: usize| points[nearest[a].1][k] - signal[k];
     let mut gram = [[0.0; MIXED]; MIXED];
-    for a in 0..count {
-        for b in 0..count {
-            gram[a][b] = (0..SUMMARY).map(|k| offset(a, k) * offset(b, k)).sum();
+    for (a, row) in gram.iter_mut().enumerate().take(count) {
+        for (b, product) in row.iter_mut().enumerate().take(count) {
+            *product = (0..SUMMARY).map(|k| offset(a, k) * offset(b, k)).sum();
         }
     }
     let mut weights = [0.0; MIXED];

@@ -76,16 +76,16 @@ impl Part {
     fn divide(&self, summaries: &[Summary], members: &mut [u32]) -> usize {
         let along = |axis: &Summary, i: u32| {
             let mut sum = 0.0;
-            for k in 0..SUMMARY {
-                sum += axis[k] * (summaries[i as usize][k] - self.mean[k]);
+            for ((a, s), m) in axis.iter().zip(&summaries[i as usize]).zip(&self.mean) {
+                sum += a * (s - m);
             }
             sum
         };
         // Starts from the axis of coordinates that varies most.
         let mut variances = [0.0; SUMMARY];
         for &i in members.iter() {
-            for k in 0..SUMMARY {
-                variances[k] += (summaries[i as usize][k] - self.mean[k]).powi(2);
+            for ((v, s), m) in variances.iter_mut().zip(&summaries[i as usize]).zip(&self.mean) {
+                *v += (s - m) * (s - m);
             }
         }
         let mut widest = 0;
@@ -100,8 +100,8 @@ impl Part {
             let mut next = [0.0; SUMMARY];
             for &i in members.iter() {
                 let weight = along(&axis, i);
-                for k in 0..SUMMARY {
-                    next[k] += weight * (summaries[i as usize][k] - self.mean[k]);
+                for ((n, s), m) in next.iter_mut().zip(&summaries[i as usize]).zip(&self.mean) {
+                    *n += weight * (s - m);
                 }
             }
             let norm = next.iter().map(|x| x * x).sum::<f64>().sqrt();
