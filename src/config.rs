@@ -191,7 +191,7 @@ impl Settings {
 /// A sentence with the names there are.
 pub fn parse_preset(text: &str) -> Result<Preset, String> {
     serde_json::from_value(serde_json::Value::String(text.to_owned()))
-        .map_err(|_| "expected default, paper or robust".to_owned())
+        .map_err(|_| "expected default, paper, robust or fast".to_owned())
 }
 
 fn given(path: &Path) -> Option<PathBuf> {

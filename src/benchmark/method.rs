@@ -6,7 +6,7 @@ use crate::signature::Descriptor;
 /// A method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Method {
-    /// Sparse coding with a preset: `default`, `robust`, `paper`.
+    /// Sparse coding with a preset: `default`, `robust`, `fast`, `paper`.
     Coding(Preset),
     /// Shape DNA of 13 eigenvalues of a surface of unit area; divided by the first of them where relative.
     ShapeDna {
@@ -21,9 +21,10 @@ pub enum Method {
 
 impl Method {
     /// All of them, in the order of the tables.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Coding(Preset::Default),
         Self::Coding(Preset::Robust),
+        Self::Coding(Preset::Fast),
         Self::Coding(Preset::Paper),
         Self::ShapeDna { relative: false },
         Self::ShapeDna { relative: true },
@@ -40,6 +41,7 @@ impl Method {
         match self {
             Self::Coding(Preset::Default) => "default",
             Self::Coding(Preset::Robust) => "robust",
+            Self::Coding(Preset::Fast) => "fast",
             Self::Coding(Preset::Paper) => "paper",
             Self::ShapeDna { relative: false } => "shape_dna",
             Self::ShapeDna { relative: true } => "shape_dna_relative",

@@ -53,11 +53,18 @@ pub fn upload(
 ///
 /// # Errors
 /// As [`upload`].
-pub fn query(client: &Client, file: MeshFile, rank_by: Option<&str>) -> Result<Value, CallError> {
+pub fn query(
+    client: &Client,
+    file: MeshFile,
+    top: Option<usize>,
+    rank_by: Option<&str>,
+) -> Result<Value, CallError> {
     let mut path = format!("/v1/query?name={}", encode(&file.name));
+    if let Some(top) = top {
+        path += &format!("&top={top}");
+    }
     if let Some(rank_by) = rank_by {
-        // Writing to a String cannot fail.
-        let _ = write!(path, "&rank_by={}", encode(rank_by));
+        path += &format!("&rank_by={}", encode(rank_by));
     }
     client.call("POST", &path, mesh_payload(file))
 }

@@ -7,7 +7,7 @@ use super::{CliError, api, dictionaries, output};
 use crate::cancel::Cancel;
 use crate::http::dto::parameters::QueryRankByName;
 use crate::mesh::{Limits, read};
-use crate::pipeline::{describe_query, rank};
+use crate::pipeline::{describe_query, rank_top};
 use crate::ranking::Index;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -89,13 +89,10 @@ impl Source {
     fn rank(&self, path: &Path, top: usize, rank_by: Option<QueryRankByName>) -> Result<Value, CliError> {
         let limits = Limits::default();
         let file = MeshFile::load(path, limits.max_bytes)?;
-        let mut answer = match self {
-            Self::Service(client) => api::query(client, file, rank_by.map(QueryRankByName::name))?,
-            Self::File(index) => rank_against(index, &file, rank_by, &limits)?,
+        let answer = match self {
+            Self::Service(client) => api::query(client, file, Some(top), rank_by.map(QueryRankByName::name))?,
+            Self::File(index) => rank_against(index, &file, top, rank_by, &limits)?,
         };
-        if let Some(classes) = answer["classes"].as_array_mut() {
-            classes.truncate(top);
-        }
         Ok(answer)
     }
 }
@@ -105,6 +102,7 @@ impl Source {
 fn rank_against(
     index: &Index,
     file: &MeshFile,
+    top: usize,
     rank_by: Option<QueryRankByName>,
     limits: &Limits,
 ) -> Result<Value, CliError> {
@@ -121,8 +119,8 @@ fn rank_against(
     let cancel = Cancel::new();
     let (format, soup) = read(&file.source(), limits)?;
     let description = describe_query(soup, &index.parameters, &cancel, &|_| ())?;
-    let ranking =
-        rank(&description.views, index, rank_by, &cancel).map_err(crate::pipeline::PipelineError::from)?;
+    let ranking = rank_top(&description.views, index, rank_by, top, &cancel)
+        .map_err(crate::pipeline::PipelineError::from)?;
     let classes: Vec<Value> = ranking
         .classes
         .iter()
@@ -146,7 +144,8 @@ fn rank_against(
         "name": file.name,
         "classes": classes,
         "confidence": ranking.confidence,
-        "compared": ranking.classes.len(),
+        "compared": ranking.compared,
+        "pruned": ranking.pruned,
         "signatures": ranking.signatures,
         "format": format,
         "warnings": description.report.warnings,

@@ -15,8 +15,9 @@ use crate::jobs::LiveIndex;
 use crate::mesh::TriangleSoup;
 use crate::model::ClassId;
 use crate::parameters::Parameters;
-use crate::pipeline::{Stage, describe_query, describe_shape, rank};
-use crate::ranking::Index;
+use crate::pipeline::prepared::OPEN_ABOVE;
+use crate::pipeline::{Stage, describe_query, describe_shape, rank, rank_top};
+use crate::ranking::{Index, SIGNIFICANCE};
 use crate::spectral;
 use crate::store::StoreError;
 use std::cell::RefCell;
@@ -65,10 +66,18 @@ pub fn answer(
             observer(Stage::Ranking);
             let ranked = match limit {
                 Some(_) => rank_until(&description.views, &index, rank_by, stop),
-                None => rank(&description.views, &index, rank_by, stop).map(|ranking| (ranking, Vec::new())),
+                None => match options.top {
+                    Some(top) => rank_top(&description.views, &index, rank_by, top, stop),
+                    None => rank(&description.views, &index, rank_by, stop),
+                }
+                .map(|ranking| (ranking, Vec::new())),
             };
             let (ranking, left) = ranked.map_err(|e| timely(e.into()))?;
-            (description, Ranked::from(ranking), left)
+            let mut ranked = Ranked::from(ranking);
+            if rank_by == parameters.rank_by && description.report.openness <= OPEN_ABOVE {
+                ranked.judge(live.calibration.as_ref());
+            }
+            (description, ranked, left)
         }
         Err(baseline) => {
             let baselines = live
@@ -96,7 +105,11 @@ pub fn answer(
         name: names.get(label).cloned().unwrap_or_else(|| label.to_owned()),
     };
     let top = options.top.unwrap_or(usize::MAX);
-    let compared = ranking.classes.len();
+    let possible = ranking
+        .classes
+        .iter()
+        .filter(|c| c.p_value.is_some_and(|p| p > SIGNIFICANCE));
+    let possible_classes = possible.map(|c| class_of(&c.label)).collect();
     let classes = ranking.classes.into_iter().take(top).enumerate().map(|(i, c)| {
         let coded = c.coded;
         RankedClass {
@@ -110,6 +123,7 @@ pub fn answer(
             mean_nonzeros: coded.as_ref().map(|c| c.mean_nonzeros),
             hypothesis: coded.as_ref().map(|c| c.hypothesis.into()),
             margin: c.margin,
+            p_value: c.p_value,
         }
     });
     let shapes = ranking
@@ -129,7 +143,10 @@ pub fn answer(
         classes: classes.collect(),
         nearest_shapes: shapes.collect(),
         confidence: ranking.confidence,
-        compared,
+        compared: ranking.compared,
+        pruned: ranking.pruned,
+        none_of_these: ranking.none_of_these,
+        possible_classes,
         partial: !left.is_empty(),
         not_compared: left.iter().map(|label| class_of(label)).collect(),
         signatures: ranking.signatures,

@@ -1,13 +1,14 @@
 //! A ranking by whatever method, as the answer needs it.
 
 use crate::baseline::{Nearest, nearest_classes};
-use crate::ranking::{ClassScore, Ranking};
+use crate::ranking::{Calibration, ClassScore, Ranking};
 
 /// A class and its score.
 pub(super) struct Class {
     pub(super) label: String,
     pub(super) score: f64,
     pub(super) margin: Option<f64>,
+    pub(super) p_value: Option<f64>,
     /// What only sparse coding knows.
     pub(super) coded: Option<ClassScore>,
 }
@@ -28,6 +29,25 @@ pub(super) struct Ranked {
     pub(super) confidence: f64,
     /// Signatures that were coded.
     pub(super) signatures: usize,
+    /// Classes that were compared with, and how many of them a bound ruled out.
+    pub(super) compared: usize,
+    pub(super) pruned: usize,
+    /// Whether no class is believed possible; `None` where that cannot be told.
+    pub(super) none_of_these: Option<bool>,
+}
+
+impl Ranked {
+    /// Adds p-values and the verdict, where there is something to tell them by.
+    pub(super) fn judge(&mut self, calibration: Option<&Calibration>) {
+        let Some(calibration) = calibration else {
+            return;
+        };
+        let verdict = calibration.judge(self.classes.iter().map(|c| (c.label.as_str(), c.score)));
+        for (class, p_value) in self.classes.iter_mut().zip(verdict.p_values) {
+            class.p_value = p_value;
+        }
+        self.none_of_these = Some(verdict.none_of_these);
+    }
 }
 
 impl From<Ranking> for Ranked {
@@ -36,6 +56,7 @@ impl From<Ranking> for Ranked {
             label: c.label.clone(),
             score: c.score,
             margin: c.margin,
+            p_value: None,
             coded: Some(c),
         };
         Self {
@@ -52,6 +73,9 @@ impl From<Ranking> for Ranked {
                 .collect(),
             confidence: ranking.confidence,
             signatures: ranking.signatures,
+            compared: ranking.compared,
+            pruned: ranking.pruned,
+            none_of_these: None,
         }
     }
 }
@@ -71,10 +95,14 @@ impl From<Vec<Nearest>> for Ranked {
             label: n.class.clone(),
             score: n.distance,
             margin: margin(i),
+            p_value: None,
             coded: None,
         });
         Self {
             confidence: margin(0).unwrap_or(1.0),
+            compared: nearest.len(),
+            pruned: 0,
+            none_of_these: None,
             classes: classes.collect(),
             shapes: shapes
                 .into_iter()

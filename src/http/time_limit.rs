@@ -105,6 +105,7 @@ fn collect(
         }
     }
     let mut ranking = whole.ok_or(RankingError::EmptyIndex)?;
+    ranking.compared = ranking.classes.len();
     order(&mut ranking);
     Ok((ranking, left))
 }
@@ -157,6 +158,8 @@ mod tests {
             shapes: Vec::new(),
             confidence: 1.0,
             signatures: 1,
+            compared: 1,
+            pruned: 0,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::baseline::BaselineIndex;
 use crate::model::Generation;
-use crate::ranking::Index;
+use crate::ranking::{Calibration, Index};
 use crate::store::{Store, StoreError};
 
 /// The index queries run against. A query holds the one it began with, whatever is switched in meanwhile.
@@ -15,6 +15,18 @@ pub struct LiveIndex {
     pub index: Index,
     /// What the baselines need, with the same labels; `None` where it was learnt without.
     pub baselines: Option<BaselineIndex>,
+    /// What scores shapes of its classes have, with the same labels; `None` where too few were learnt from.
+    pub calibration: Option<Calibration>,
+}
+
+/// The calibration of a generation.
+pub(super) fn calibration(generation: &Generation) -> Option<Calibration> {
+    let held_out: Vec<(String, &[f64])> = generation
+        .classes
+        .iter()
+        .map(|class| (class.class.to_string(), class.report.held_out.as_slice()))
+        .collect();
+    Calibration::fit(held_out.iter().map(|(label, scores)| (label.as_str(), *scores)))
 }
 
 /// What the baselines need of a generation. Ranking by sparse coding does without, so damage only costs the baselines.
@@ -43,6 +55,7 @@ pub(super) fn load(store: &Store) -> Result<(LiveIndex, bool), StoreError> {
     let lost = match loaded {
         Ok(Some((generation, index, baselines))) => {
             let live = LiveIndex {
+                calibration: calibration(&generation),
                 generation: Some(generation),
                 index,
                 baselines,
@@ -63,6 +76,7 @@ pub(super) fn load(store: &Store) -> Result<(LiveIndex, bool), StoreError> {
             classes: Vec::new(),
         },
         baselines: None,
+        calibration: None,
     };
     Ok((live, lost))
 }

@@ -3,7 +3,7 @@
 use super::baselines::learn_baselines;
 use super::describe::Describer;
 use super::failure::{ReindexError, code};
-use super::live::{LiveIndex, load_baselines};
+use super::live::{LiveIndex, calibration, load_baselines};
 use super::plan::{Plan, ToLearn, plan, shape_key, skipped};
 use super::progress::Progress;
 use crate::cancel::Cancel;
@@ -295,6 +295,7 @@ fn switch(
     store.put_generation_and_switch(&generation)?;
     let number = generation.number;
     live.store(Arc::new(LiveIndex {
+        calibration: calibration(&generation),
         generation: Some(generation),
         index,
         baselines,

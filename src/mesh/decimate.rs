@@ -1,6 +1,7 @@
 //! Simplification to the working size by quadric error (Garland and Heckbert 1997), with meshoptimizer.
 
 use super::clean::{Cleaned, clean_again, drop_unreferenced};
+use super::locality::order_along_curve;
 use super::orient::orient;
 use super::{Components, MeshError};
 use meshopt::{SimplifyOptions, simplify_decoder, simplify_sloppy_decoder};
@@ -23,6 +24,9 @@ const ROUNDS: usize = 20;
 
 /// The first round of collapses aims at this many times the working size.
 const MARGIN: f64 = 1.1;
+
+/// Larger meshes do not fit the cache, so it pays to bring neighbours together first.
+const OUT_OF_CACHE: usize = 20_000;
 
 /// No bound on the error: the target is a size.
 const ANY_ERROR: f32 = 1e3;
@@ -50,6 +54,9 @@ pub(super) fn simplify_to(
     }
     // Fewer than four vertices are not a mesh.
     let size = working_size.max(4);
+    if mesh.vertices.len() > OUT_OF_CACHE {
+        order_along_curve(&mut mesh.vertices, &mut mesh.faces);
+    }
     if !oriented {
         orient(mesh.vertices.len(), &mut mesh.faces);
     }

@@ -11,6 +11,7 @@ pub mod error;
 pub mod gltf;
 pub mod holes;
 pub mod limits;
+mod locality;
 pub mod obj;
 pub mod off;
 pub mod orient;

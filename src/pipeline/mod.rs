@@ -9,7 +9,7 @@ pub mod learn;
 pub mod prepared;
 pub mod stage;
 
-pub use crate::ranking::rank;
+pub use crate::ranking::{rank, rank_top};
 pub use describe::{Description, describe_both, describe_query, describe_shape};
 pub use error::PipelineError;
 pub use held_out::held_out_scores;

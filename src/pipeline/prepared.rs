@@ -16,7 +16,7 @@ use crate::spectral::{
 };
 
 /// A query with a boundary longer than this many √area is open: a single view has 8 to 16, a half sphere 2.507.
-const OPEN_ABOVE: f64 = 2.5;
+pub const OPEN_ABOVE: f64 = 2.5;
 /// Full area over visible area, as assumed for an open query (method, step 10).
 const AREA_SCALES: [f64; 4] = [2.0, 2.5, 3.0, 4.0];
 /// How many eigenvalues a description reports.

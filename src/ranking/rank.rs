@@ -1,10 +1,10 @@
 //! Class scores → ranking.
 
-use super::score::{Score, prepare_views, score};
+use super::score::{Score, prepare_views};
+use super::search::{Candidate, Search};
 use super::{Index, RankingError, View};
 use crate::cancel::Cancel;
 use crate::parameters::{Hypothesis, RankBy};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// How well one class regenerates a query.
@@ -48,7 +48,7 @@ pub struct ShapeScore {
 /// A query's answer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ranking {
-    /// All classes, best first.
+    /// The classes, best first: all, or as many as were asked for.
     pub classes: Vec<ClassScore>,
     /// Shapes with a dictionary of their own, best first; empty where the index has none.
     pub shapes: Vec<ShapeScore>,
@@ -56,6 +56,11 @@ pub struct Ranking {
     pub confidence: f64,
     /// Signatures that were coded, of the plain view.
     pub signatures: usize,
+    /// Classes in the index.
+    pub compared: usize,
+    /// Classes of these that a lower bound of their score left out; the query's signatures were coded under the
+    /// dictionaries of the others.
+    pub pruned: usize,
 }
 
 /// Codes a query under every dictionary of the index and orders the classes (method, steps 8 to 10; Eq. 5).
@@ -73,54 +78,88 @@ pub fn rank(
     rank_by: RankBy,
     cancel: &Cancel,
 ) -> Result<Ranking, RankingError> {
+    ranking(views, index, rank_by, None, cancel)
+}
+
+/// As [`rank`], but only the `top` best classes and shapes, exactly as they stand in the full ranking.
+///
+/// Among many and ordered by mean objective, most are left out by a lower bound of their score that exceeds the scores
+/// of enough others. By the trimmed objective and by Eq. 5, which have no such bound, all are coded.
+///
+/// # Errors
+/// As [`rank`].
+pub fn rank_top(
+    views: &[View],
+    index: &Index,
+    rank_by: RankBy,
+    top: usize,
+    cancel: &Cancel,
+) -> Result<Ranking, RankingError> {
+    ranking(views, index, rank_by, Some(top), cancel)
+}
+
+fn ranking(
+    views: &[View],
+    index: &Index,
+    rank_by: RankBy,
+    top: Option<usize>,
+    cancel: &Cancel,
+) -> Result<Ranking, RankingError> {
     if index.classes.is_empty() {
         return Err(RankingError::EmptyIndex);
     }
-    let lambda = index.parameters.lambda;
     let prepared = prepare_views(views, rank_by)?;
-    let mut classes = index
+    let search = Search {
+        views: &prepared,
+        lambda: index.parameters.lambda,
+        rank_by,
+        cancel,
+    };
+    // One more than asked for, because the last one's margin is against it.
+    let wanted = top.map(|top| top.saturating_add(1));
+    let candidates: Vec<_> = index
         .classes
-        .par_iter()
-        .map(|class| {
-            let s = score(
-                &prepared,
-                &class.dictionaries,
-                lambda,
-                rank_by,
-                &class.label,
-                cancel,
-            )?;
-            Ok(class_score(&class.label, &s))
+        .iter()
+        .map(|class| Candidate {
+            label: &class.label,
+            dictionaries: &class.dictionaries,
         })
-        .collect::<Result<Vec<_>, RankingError>>()?;
-    classes.sort_by(|a, b| a.score.total_cmp(&b.score).then_with(|| a.label.cmp(&b.label)));
+        .collect();
+    let found = search.best(&candidates, wanted)?;
+    let mut classes: Vec<ClassScore> = found
+        .iter()
+        .map(|(i, score)| class_score(candidates[*i].label, score))
+        .collect();
     for i in 1..classes.len() {
         classes[i - 1].margin = Some(margin(classes[i - 1].score, classes[i].score));
     }
-    let mut shapes = index
+    let (owners, candidates): (Vec<_>, Vec<_>) = index
         .classes
-        .par_iter()
-        .flat_map(|class| class.shapes.par_iter().map(move |shape| (class, shape)))
+        .iter()
+        .flat_map(|class| class.shapes.iter().map(move |shape| (class, shape)))
         .map(|(class, shape)| {
-            let s = score(
-                &prepared,
-                &shape.dictionaries,
-                lambda,
-                rank_by,
-                &shape.label,
-                cancel,
-            )?;
-            Ok(ShapeScore {
-                class: class.label.clone(),
-                label: shape.label.clone(),
-                score: s.value,
-                frobenius_error: s.plain.frobenius,
-                hypothesis: s.hypothesis,
-            })
+            let candidate = Candidate {
+                label: &shape.label,
+                dictionaries: &shape.dictionaries,
+            };
+            (class, candidate)
         })
-        .collect::<Result<Vec<_>, RankingError>>()?;
-    shapes.sort_by(|a, b| a.score.total_cmp(&b.score).then_with(|| a.label.cmp(&b.label)));
+        .unzip();
+    let mut shapes: Vec<ShapeScore> = search
+        .best(&candidates, wanted)?
+        .iter()
+        .map(|(i, score)| ShapeScore {
+            class: owners[*i].label.clone(),
+            label: candidates[*i].label.to_owned(),
+            score: score.value,
+            frobenius_error: score.plain.frobenius,
+            hypothesis: score.hypothesis,
+        })
+        .collect();
+    let coded = classes.len();
     let confidence = classes[0].margin.unwrap_or(1.0);
+    classes.truncate(top.unwrap_or(usize::MAX));
+    shapes.truncate(top.unwrap_or(usize::MAX));
     let signatures = views
         .iter()
         .find(|v| v.hypothesis == Hypothesis::Plain)
@@ -130,6 +169,8 @@ pub fn rank(
         shapes,
         confidence,
         signatures,
+        compared: index.classes.len(),
+        pruned: index.classes.len() - coded,
     })
 }
 

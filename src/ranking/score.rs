@@ -4,6 +4,7 @@ use super::{RankingError, View};
 use crate::cancel::Cancel;
 use crate::coding::{CodeScore, CodingError, Dictionary, Signals, Workspace, score_signals};
 use crate::parameters::{Channel, Hypothesis, RankBy};
+use faer::MatRef;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -68,6 +69,23 @@ pub struct PreparedView<'a> {
     view: &'a View,
     signals: Signals<'a>,
     energy: f64,
+}
+
+impl PreparedView<'_> {
+    /// The hypothesis it was prepared under.
+    pub(super) fn hypothesis(&self) -> Hypothesis {
+        self.view.hypothesis
+    }
+
+    /// The channel it is coded under.
+    pub(super) fn channel(&self) -> Channel {
+        self.view.channel
+    }
+
+    /// The signals, M × N.
+    pub(super) fn matrix(&self) -> MatRef<'_, f64> {
+        self.view.signatures.matrix.as_ref()
+    }
 }
 
 /// Makes views ready for coding. A ranking by Eq. 5 knows the plain hypothesis only.
@@ -138,7 +156,18 @@ pub fn score(
         }
     }
     let plain = plain.ok_or(RankingError::NoPlainView)?;
-    let mut best = (plain.by(rank_by), Hypothesis::Plain);
+    let (value, hypothesis) = combine(plain.by(rank_by), whitened, &doubled);
+    Ok(Score {
+        value,
+        hypothesis,
+        plain,
+    })
+}
+
+/// The hypotheses' errors of one class → its score and the hypothesis it comes from; see [`score`]. Grows with each of
+/// the errors, so bounds of them give a bound of it.
+pub(super) fn combine(plain: f64, whitened: Option<f64>, doubled: &[f64]) -> (f64, Hypothesis) {
+    let mut best = (plain, Hypothesis::Plain);
     if let Some(m1) = whitened.map(|m| m + WHITENED_OFFSET)
         && m1 < best.0
     {
@@ -146,16 +175,12 @@ pub fn score(
     }
     if !doubled.is_empty() {
         best.0 += OPEN_PLAIN_OFFSET;
-        let m2 = soft_minimum(&doubled, AREA_TEMPERATURE);
+        let m2 = soft_minimum(doubled, AREA_TEMPERATURE);
         if m2 < best.0 {
             best = (m2, Hypothesis::Doubled);
         }
     }
-    Ok(Score {
-        value: best.0,
-        hypothesis: best.1,
-        plain,
-    })
+    best
 }
 
 /// −τ ln mean_s exp(−m_s/τ), the minimum subtracted first so that nothing underflows.

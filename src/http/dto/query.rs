@@ -12,7 +12,8 @@ use utoipa::{IntoParams, ToSchema};
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct QueryOptions {
-    /// How many classes (and nearest shapes) are answered at most; all where it is left out.
+    /// How many classes (and nearest shapes) are answered at most; all where it is left out. Among thousands of
+    /// classes a query for a few is much faster, and answers the same as the head of the full ranking.
     #[param(minimum = 1)]
     pub top: Option<usize>,
     /// What classes are ordered by; the index's own parameter where it is left out. `shape_dna`, `shape_dna_relative`,
@@ -53,6 +54,9 @@ pub struct RankedClass {
     pub hypothesis: Option<HypothesisName>,
     /// By how much the next class is worse, relative to it; `null` for the last.
     pub margin: Option<f64>,
+    /// The share of training shapes that fit their own class no better than the query fits this one, when the class
+    /// had been learnt without them; `null` where that cannot be told (see `none_of_these`).
+    pub p_value: Option<f64>,
 }
 
 /// How well a single training shape regenerates the query, or how near it is.
@@ -84,6 +88,17 @@ pub struct QueryAnswer {
     pub confidence: f64,
     /// Classes that were compared with.
     pub compared: usize,
+    /// Classes of these that were ruled out by a lower bound of their score instead of being evaluated in full. The
+    /// answer is the same as if they had been. Above 0 only where `top` is given and small against the number of
+    /// classes.
+    pub pruned: usize,
+    /// Whether the query is believed to be of none of the indexed classes: no answered class has a p-value above 0.05.
+    /// `null` where that cannot be told: with fewer than 19 training shapes beside each class's first, of an open
+    /// surface such as a single view, and where the ranking is not by the index's own measure.
+    pub none_of_these: Option<bool>,
+    /// The classes with a p-value above 0.05. For 95 of 100 queries that are like the training shapes the true class is
+    /// among them. Empty where nothing can be told.
+    pub possible_classes: Vec<ClassRef>,
     /// Whether the time limit came before all classes were compared with.
     pub partial: bool,
     /// The classes that were not; empty unless `partial`.

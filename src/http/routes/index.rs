@@ -80,7 +80,7 @@ pub async fn get_parameters(State(state): State<AppState>) -> Result<Json<Parame
         Some(generation) => generation.parameters.clone(),
         None => Parameters::preset(state.config.preset),
     };
-    let presets = [Preset::Default, Preset::Paper, Preset::Robust]
+    let presets = Preset::ALL
         .into_iter()
         .map(|preset| PresetDto {
             name: preset.into(),
