@@ -119,6 +119,8 @@ settings! {
     max_faces: usize = 4_000_000, "SHAPELEX_MAX_FACES", "COUNT";
     /// Poses sampled from one animated file, at most
     max_poses: usize = 64, "SHAPELEX_MAX_POSES", "COUNT";
+    /// Memory that requests may take for computing, all together, in MiB; a mesh that would take more is refused
+    memory_mib: u64 = 2048, "SHAPELEX_MEMORY_MIB", "MIB";
     /// Threads that answer queries; 0 takes one per core
     query_threads: usize = 0, "SHAPELEX_QUERY_THREADS", "COUNT";
     /// Queries that may wait for a thread before more are refused
@@ -185,13 +187,14 @@ fn one_line(error: &toml::de::Error, text: &str) -> String {
 
 impl Config {
     fn validate(&self) -> Result<(), ConfigError> {
-        let at_least_one: [(&'static str, u64); 14] = [
+        let at_least_one: [(&'static str, u64); 15] = [
             ("max_body_mib", self.max_body_mib as u64),
             ("max_upload_files", self.max_upload_files as u64),
             ("max_unpacked_mib", self.max_unpacked_mib as u64),
             ("max_vertices", self.max_vertices as u64),
             ("max_faces", self.max_faces as u64),
             ("max_poses", self.max_poses as u64),
+            ("memory_mib", self.memory_mib),
             ("query_queue", self.query_queue as u64),
             ("query_wait_seconds", self.query_wait_seconds),
             ("query_timeout_seconds", self.query_timeout_seconds),
@@ -232,6 +235,7 @@ impl Config {
                 max_poses: self.max_poses,
                 ..Limits::default()
             },
+            memory_bytes: self.memory_mib << 20,
             query_threads: or_default(self.query_threads, default.query_threads),
             query_queue: self.query_queue,
             query_wait: Duration::from_secs(self.query_wait_seconds),

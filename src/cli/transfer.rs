@@ -28,10 +28,8 @@ impl Client {
         let file = File::open(from).map_err(|error| CliError::at(from, error))?;
         let length = file.metadata().map_err(|error| CliError::at(from, error))?.len();
         let (status, bytes) = match &self.0 {
-            Transport::Remote { agent, base } => {
-                let request = ureq::http::Request::builder()
-                    .method("POST")
-                    .uri(format!("{base}{path}"))
+            Transport::Remote { agent, base, key } => {
+                let request = authorized(ureq::http::Request::post(format!("{base}{path}")), key.as_deref())
                     .header("content-type", media_type)
                     .header("content-length", length)
                     .body(file)
@@ -74,9 +72,10 @@ impl Client {
         };
         let mut file = tempfile::NamedTempFile::new_in(folder).map_err(at)?;
         let length = match &self.0 {
-            Transport::Remote { agent, base } => {
-                let url = format!("{base}{path}");
-                let request = ureq::http::Request::get(url).body(()).map_err(unreachable)?;
+            Transport::Remote { agent, base, key } => {
+                let request = authorized(ureq::http::Request::get(format!("{base}{path}")), key.as_deref())
+                    .body(())
+                    .map_err(unreachable)?;
                 let mut response = agent.run(request).map_err(unreachable)?;
                 let status = response.status().as_u16();
                 if status != 200 {
@@ -120,6 +119,13 @@ impl Client {
         file.as_file().sync_all().map_err(at)?;
         file.persist(to).map_err(|error| at(error.error))?;
         Ok(length)
+    }
+}
+
+fn authorized(request: ureq::http::request::Builder, key: Option<&str>) -> ureq::http::request::Builder {
+    match key {
+        Some(key) => request.header("authorization", format!("Bearer {key}")),
+        None => request,
     }
 }
 

@@ -9,9 +9,12 @@ use super::problem_from::index_empty;
 use super::state::Parts;
 use super::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
+use crate::mesh::TriangleSoup;
 use crate::model::ClassId;
+use crate::parameters::Parameters;
 use crate::pipeline::{Stage, describe_query, rank};
 use crate::ranking::Index;
+use crate::spectral;
 use crate::store::StoreError;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -41,8 +44,12 @@ pub fn answer(
     let watch = Stopwatch::default();
     let observer = |stage| watch.begin(stage);
     observer(Stage::Read);
+    let reading = state.memory.reserve_reading(mesh.bytes.len())?;
     let (format, soup) = mesh.read(&state.config.limits)?;
+    // Held beside each other, since preparing, which the reading is reserved for, is a part of describing.
+    let _spectrum = state.memory.reserve(spectrum_bytes(&soup, parameters))?;
     let description = describe_query(soup, parameters, &work.cancel, &observer)?;
+    drop(reading);
     observer(Stage::Ranking);
     let rank_by = options.rank_by.map_or(parameters.rank_by, Into::into);
     let ranking = rank(&description.views, &index, rank_by, &work.cancel)?;
@@ -101,6 +108,16 @@ pub fn answer(
         parameters: parameters.clone().into(),
         timings_ms: timings(&stages, work.waited, began.elapsed()),
     })
+}
+
+/// Memory the spectrum takes, in bytes, by the size the mesh is simplified to.
+fn spectrum_bytes(soup: &TriangleSoup, parameters: &Parameters) -> u64 {
+    let vertices = match parameters.working_size {
+        0 => soup.vertices.len(),
+        // Simplification may stop above its goal, so some room is left.
+        size => soup.vertices.len().min(size.saturating_mul(2)),
+    };
+    spectral::estimated_bytes(vertices, parameters.eigenpairs) as u64
 }
 
 /// The index without the classes that were deleted since it was learnt, and the names the others have now.

@@ -31,6 +31,8 @@ pub struct ServiceConfig {
     pub max_unpacked_bytes: usize,
     /// What reading one mesh may build at most.
     pub limits: Limits,
+    /// Bytes of memory that requests may take for computing, all together.
+    pub memory_bytes: u64,
     /// Threads that answer queries and check uploads.
     pub query_threads: usize,
     /// Queries that may wait for a thread.
@@ -73,6 +75,7 @@ impl Default for ServiceConfig {
             max_upload_files: 2048,
             max_unpacked_bytes: 256 << 20,
             limits: Limits::default(),
+            memory_bytes: 2 << 30,
             query_threads: cores,
             query_queue: 64,
             query_wait: Duration::from_secs(10),

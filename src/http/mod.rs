@@ -12,6 +12,7 @@ pub mod dto;
 pub mod extract;
 mod housekeeping;
 pub mod keyring;
+pub mod memory;
 pub mod metrics;
 pub mod openapi;
 pub mod problem;

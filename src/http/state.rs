@@ -4,6 +4,7 @@ use super::admission::{Compute, ComputeOptions};
 use super::auth;
 use super::config::ServiceConfig;
 use super::keyring::Keyring;
+use super::memory::MemoryBudget;
 use super::problem::Problem;
 use super::{metrics, openapi};
 use crate::jobs::{JobError, Jobs};
@@ -57,6 +58,8 @@ pub struct Parts {
     pub jobs: Jobs,
     /// Where requests compute.
     pub compute: Compute,
+    /// What requests may take of the memory.
+    pub memory: MemoryBudget,
     /// Held while a request reads the catalogue and then changes it by what it read.
     pub catalogue: Mutex<()>,
     /// Set when the service is asked to stop; open streams end then.
@@ -116,8 +119,10 @@ impl AppState {
             queue: config.query_queue,
             wait: config.query_wait,
         })?;
+        let memory = MemoryBudget::new(config.memory_bytes);
         Ok(Self(Arc::new(Parts {
             config,
+            memory,
             store,
             keys,
             jobs,

@@ -1,7 +1,7 @@
 //! From read-only back to writable, without opening the store anew.
 
 use super::open::settle;
-use super::{Store, StoreError, files};
+use super::{Store, StoreError, files, snapshot};
 use std::path::Path;
 use std::sync::PoisonError;
 
@@ -25,7 +25,8 @@ impl Store {
         probe(self.path())?;
         let _files = self.inner.files.write().unwrap_or_else(PoisonError::into_inner);
         let mut writer = self.inner.writer();
-        self.inner.backend.reopen(&mut || Ok(()))?;
+        // A switch to a snapshot may be what met the full disk.
+        self.inner.backend.reopen(&mut || snapshot::go_on(self.path()))?;
         let mut notes = Vec::new();
         *writer = settle(self.path(), &*self.inner.backend, &mut notes)?;
         for line in notes {

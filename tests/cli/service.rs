@@ -221,6 +221,86 @@ fn a_service_is_indexed_queried_and_stopped() {
 }
 
 #[test]
+fn a_snapshot_goes_to_a_file_and_back_into_a_fresh_directory_and_a_running_service() {
+    let dir = tempfile::tempdir().unwrap();
+    small_zoo(dir.path());
+    let set = ["--set", "atoms=16", "--set", "samples_per_shape=200"];
+    answer(
+        dir.path(),
+        &[&["index", "shapes", "--data", "one"], &set[..]].concat(),
+    );
+    let class = classes(dir.path())[1].clone();
+    let file = first_file(dir.path(), &class);
+    let rank = |target: &[&str]| {
+        let args = [&["query", &file, "--json"], target].concat();
+        last_json(&answer(dir.path(), &args))["classes"].clone()
+    };
+    let before = rank(&["--data", "one"]);
+
+    let made = last_json(&answer(
+        dir.path(),
+        &[
+            "snapshot",
+            "create",
+            "--data",
+            "one",
+            "--out",
+            "all.tar.zst",
+            "--json",
+        ],
+    ));
+    assert_eq!(made["classes"], 3);
+    let id = made["id"].as_str().unwrap();
+    let listed = answer(dir.path(), &["snapshot", "list", "--data", "one"]);
+    assert!(listed.contains(id), "{listed}");
+
+    let text = answer(
+        dir.path(),
+        &["snapshot", "restore", "all.tar.zst", "--data", "two"],
+    );
+    assert!(text.contains("restored: 3 classes"), "{text}");
+    assert_eq!(rank(&["--data", "two"]), before);
+
+    let service = Service::start(dir.path(), &["--data", "three"]);
+    let server = ["--server", service.url.as_str()];
+    answer(
+        dir.path(),
+        &[&["snapshot", "restore", "all.tar.zst"], &server[..]].concat(),
+    );
+    assert_eq!(rank(&server), before);
+    let made = last_json(&answer(
+        dir.path(),
+        &[&["snapshot", "create", "--json"], &server[..]].concat(),
+    ));
+    let id = made["id"].as_str().unwrap();
+    let download = ["snapshot", "download", id, "--out", "again.tar.zst"];
+    answer(dir.path(), &[&download, &server[..]].concat());
+    assert_eq!(
+        std::fs::metadata(dir.path().join("again.tar.zst")).unwrap().len(),
+        made["bytes"].as_u64().unwrap()
+    );
+    answer(dir.path(), &[&["snapshot", "restore", id], &server[..]].concat());
+    answer(dir.path(), &[&["snapshot", "delete", id], &server[..]].concat());
+    assert_eq!(
+        answer(dir.path(), &[&["snapshot", "list"], &server[..]].concat()),
+        "no snapshots\n"
+    );
+
+    std::fs::write(dir.path().join("no.tar.zst"), b"no").unwrap();
+    let refused = run(
+        dir.path(),
+        &[&["snapshot", "restore", "no.tar.zst"], &server[..]].concat(),
+    );
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(
+        stderr(&refused).contains("cannot be restored"),
+        "{}",
+        stderr(&refused)
+    );
+    assert_eq!(rank(&server), before);
+}
+
+#[test]
 fn a_taken_port_is_said_at_once() {
     let dir = tempfile::tempdir().unwrap();
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();

@@ -10,13 +10,13 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Clients that change the catalogue at the same time.
 const WORKERS: u32 = 3;
 
-fn number(name: &str, default: u64) -> u64 {
+pub fn number(name: &str, default: u64) -> u64 {
     std::env::var(name).map_or(default, |text| text.parse().unwrap())
 }
 
@@ -27,6 +27,10 @@ struct Seen {
     jobs: BTreeMap<String, Option<String>>,
     /// The latest generation that answered.
     generation: u64,
+    /// Acknowledged snapshots with the hash of their file.
+    snapshots: BTreeMap<String, String>,
+    /// Jobs and snapshots acknowledged so far.
+    acknowledged: u64,
 }
 
 /// What happened, for the report.
@@ -40,7 +44,7 @@ struct Tally {
 }
 
 /// Parameters that learn within some ten milliseconds.
-fn small() -> Value {
+pub fn small() -> Value {
     json!({"parameters": {
         "eigenpairs": 12, "energies": 12, "atoms": 4, "iterations": 2, "batch": 32, "samples_per_shape": 40,
         "query_samples": 40,
@@ -90,11 +94,10 @@ fn everything_acknowledged_survives_every_kill() {
     assert!(!log.contains("panicked"), "{log}");
     let acknowledged: u64 = workers.iter().map(|w| w.acknowledged).sum();
     println!(
-        "survived {} of {kills} kills in {:.0} s: {acknowledged} changes and {} jobs acknowledged, generation {}; {tally:?}",
+        "survived {} of {kills} kills in {:.0} s: {acknowledged} changes and {} jobs and snapshots acknowledged; {tally:?}",
         tally.killed_working + tally.killed_starting,
         began.elapsed().as_secs_f64(),
-        seen.jobs.len(),
-        seen.generation,
+        seen.acknowledged,
     );
     assert!(acknowledged >= kills, "hardly anything was acknowledged");
 }
@@ -131,6 +134,14 @@ fn check(service: &Service, workers: &mut [Worker], seen: &mut Seen, tally: &mut
         seen.generation
     );
     seen.generation = generation;
+    for (id, hash) in &seen.snapshots {
+        let file = client.get(&format!("/v1/snapshots/{id}/file")).body;
+        assert_eq!(
+            blake3::hash(&file).to_hex().as_str(),
+            hash,
+            "snapshot {id} changed"
+        );
+    }
     query(&client, tally);
 }
 
@@ -152,6 +163,8 @@ fn work_and_kill(service: Service, workers: &mut [Worker], seen: &mut Seen, afte
     let ended = AtomicBool::new(false);
     let client = Client::new(&service.url);
     let jobs = Mutex::new(Vec::new());
+    let snapshots = Mutex::new(std::mem::take(&mut seen.snapshots));
+    let made = AtomicU64::new(0);
     std::thread::scope(|scope| {
         for worker in workers.iter_mut() {
             let (client, ended) = (client.clone(), &ended);
@@ -177,6 +190,31 @@ fn work_and_kill(service: Service, workers: &mut [Worker], seen: &mut Seen, afte
                     assert_eq!(answer.code(), "nothing_to_index", "{}", answer.text());
                 }
                 std::thread::sleep(Duration::from_millis(25));
+            }
+        });
+        let (snapshotting, ended_here, snapshots, made) = (client.clone(), &ended, &snapshots, &made);
+        scope.spawn(move || {
+            while !ended_here.load(Ordering::Relaxed) {
+                let Some(answer) = snapshotting.json("POST", "/v1/snapshots", &json!({})) else {
+                    return;
+                };
+                assert_eq!(answer.status, 201, "{}", answer.text());
+                let text = |name: &str| answer.value()[name].as_str().unwrap().to_owned();
+                snapshots.lock().unwrap().insert(text("id"), text("hash"));
+                made.fetch_add(1, Ordering::Relaxed);
+                // No longer counted on from the moment its deletion is asked for.
+                let oldest = match snapshots.lock().unwrap() {
+                    mut all if all.len() > 3 => all.pop_first(),
+                    _ => None,
+                };
+                if let Some((id, _)) = oldest {
+                    let path = format!("/v1/snapshots/{id}");
+                    let Some(answer) = snapshotting.json("DELETE", &path, &json!({})) else {
+                        return;
+                    };
+                    assert_eq!(answer.status, 204, "{}", answer.text());
+                }
+                std::thread::sleep(Duration::from_millis(40));
             }
         });
         std::thread::sleep(after);

@@ -6,9 +6,12 @@
 #![cfg(all(feature = "service", unix))]
 
 mod client;
+mod disk_full;
 mod kills;
+mod memory;
 mod model;
 mod process;
+mod restores;
 
 /// A bumpy torus as OFF text; every seed gives another one, so that no two uploads are the same file.
 pub fn mesh(seed: u32) -> String {

@@ -212,7 +212,7 @@ fn learn(after: &mut Catalogue, change: &Change, answer: &Value) {
 }
 
 /// Whether what was found is what is wanted, identifiers included where they are known.
-fn agrees(found: &Catalogue, wanted: &Catalogue) -> bool {
+pub fn agrees(found: &Catalogue, wanted: &Catalogue) -> bool {
     let same = |found: &Option<String>, wanted: &Option<String>| wanted.is_none() || found == wanted;
     found.keys().eq(wanted.keys())
         && found.values().zip(wanted.values()).all(|(found, wanted)| {
@@ -227,7 +227,7 @@ fn agrees(found: &Catalogue, wanted: &Catalogue) -> bool {
 }
 
 /// Everything under a prefix, each file read and compared with what was sent.
-fn read(client: &Client, prefix: &str) -> Catalogue {
+pub fn read(client: &Client, prefix: &str) -> Catalogue {
     let mut catalogue = Catalogue::new();
     for class in client.list("/v1/classes") {
         let name = class["name"].as_str().unwrap();

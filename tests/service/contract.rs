@@ -75,7 +75,7 @@ fn every_operation_is_named_described_and_tagged() {
             assert_eq!(operation["tags"].as_array().unwrap().len(), 1, "{method} {path}");
         }
     }
-    assert_eq!(ids.len(), 29);
+    assert_eq!(ids.len(), 36);
 }
 
 #[tokio::test(flavor = "multi_thread")]

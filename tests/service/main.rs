@@ -10,4 +10,5 @@ mod harness;
 mod meshes;
 mod operation;
 mod security;
+mod snapshots;
 mod uploads;

@@ -7,6 +7,7 @@ use axum::body::Body;
 use axum::http::Request;
 use axum::middleware::from_fn_with_state;
 use axum::routing::get;
+use serde_json::json;
 use shapelex::http::respond;
 use std::time::Duration;
 use tower_http::catch_panic::CatchPanicLayer;
@@ -123,4 +124,19 @@ async fn a_full_house_turns_away_and_says_when_to_come_back() {
     let refused = [&a, &b, &c].into_iter().find(|r| r.status == 503).unwrap();
     assert_eq!(refused.fails(503, "overloaded")["retry_after_seconds"], 30);
     assert_eq!(refused.header("retry-after"), "30");
+}
+
+#[tokio::test]
+async fn a_mesh_that_does_not_fit_the_memory_is_refused_before_it_is_built() {
+    let app = App::with(|config| config.memory_bytes = 200 << 10);
+    let mesh = crate::meshes::off("bean", 0);
+    let long = [&mesh[..], &vec![b'\n'; 40 << 10]].concat();
+    let path = "/v1/classes/bean/shapes?create=true";
+    let refused = app
+        .post(path, "model/off", long)
+        .await
+        .fails(413, "mesh_too_large");
+    assert_eq!(refused["limit"], 200 << 10);
+    assert_eq!(app.get("/v1/classes").await.value()["items"], json!([]));
+    assert_eq!(app.state.memory.reserved(), 0);
 }

@@ -2,7 +2,7 @@
 
 use crate::{name, shape};
 use proptest::prelude::*;
-use shapelex::model::{ClassId, ShapeId};
+use shapelex::model::{ClassId, NewShape, ShapeId};
 use shapelex::store::{Health, MemoryBackend, Store, StoreError};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,6 +13,7 @@ use tempfile::TempDir;
 #[derive(Clone, Debug)]
 enum Change {
     Create(u8),
+    Fill(u8, Vec<(u8, Option<u8>)>),
     Rename(usize, u8),
     DeleteClass(usize),
     AddShapes(usize, Vec<(u8, Option<u8>)>),
@@ -64,6 +65,20 @@ fn pick<K: Copy>(keys: impl ExactSizeIterator<Item = K>, n: usize) -> Option<K> 
     if length == 0 { None } else { keys.nth(n % length) }
 }
 
+/// What a shape holds, as the model has it.
+fn contents((n, pose): &(u8, Option<u8>)) -> (String, Option<usize>) {
+    (format!("mesh {n}"), pose.map(usize::from))
+}
+
+fn new_shapes(list: &[(u8, Option<u8>)]) -> Vec<NewShape> {
+    list.iter()
+        .map(|entry| {
+            let (text, pose) = contents(entry);
+            shape(&text, pose)
+        })
+        .collect()
+}
+
 fn class_name(n: u8) -> String {
     format!("class {n}")
 }
@@ -75,6 +90,15 @@ fn change(store: &Store, model: &Model, change: &Change) -> Result<Model, StoreE
         Change::Create(n) => {
             let class = store.create_class(name(&class_name(*n)))?;
             after.insert(class.id, (class_name(*n), Shapes::new()));
+        }
+        Change::Fill(n, list) => {
+            let added = store.create_filled_class(name(&class_name(*n)), new_shapes(list))?;
+            let class = added[0].shape.class;
+            let shapes = list.iter().zip(added).map(|(entry, added)| {
+                assert_eq!(added.shape.class, class);
+                (added.shape.id, contents(entry))
+            });
+            after.insert(class, (class_name(*n), shapes.collect()));
         }
         Change::Rename(c, n) => {
             if let Some(id) = pick(model.keys().copied(), *c) {
@@ -90,14 +114,10 @@ fn change(store: &Store, model: &Model, change: &Change) -> Result<Model, StoreE
         }
         Change::AddShapes(c, list) => {
             if let Some(id) = pick(model.keys().copied(), *c) {
-                let new = list
-                    .iter()
-                    .map(|(n, pose)| shape(&format!("mesh {n}"), pose.map(usize::from)))
-                    .collect();
-                let added = store.add_shapes(id, new)?;
+                let added = store.add_shapes(id, new_shapes(list))?;
                 let shapes = &mut after.get_mut(&id).unwrap().1;
-                for ((n, pose), added) in list.iter().zip(added) {
-                    let entry = (format!("mesh {n}"), pose.map(usize::from));
+                for (entry, added) in list.iter().zip(added) {
+                    let entry = contents(entry);
                     let known = shapes.values().any(|e| *e == entry);
                     assert_eq!(added.created, !known);
                     if known {
@@ -128,6 +148,13 @@ fn expected(model: &Model, what: &Change) -> Option<Outline> {
     match what {
         Change::Create(n) if taken(&outline, n) => return None,
         Change::Create(n) => outline.push((class_name(*n), Vec::new())),
+        Change::Fill(n, _) if taken(&outline, n) => return None,
+        Change::Fill(n, list) => {
+            let mut shapes: Vec<_> = list.iter().map(contents).collect();
+            shapes.sort();
+            shapes.dedup();
+            outline.push((class_name(*n), shapes));
+        }
         Change::Rename(c, n) => {
             let Some(old) = class_of(c) else {
                 return Some(outline);
@@ -147,8 +174,8 @@ fn expected(model: &Model, what: &Change) -> Option<Outline> {
         Change::AddShapes(c, list) => {
             let old = class_of(c);
             for (_, shapes) in outline.iter_mut().filter(|(name, _)| Some(name) == old.as_ref()) {
-                for (n, pose) in list {
-                    let entry = (format!("mesh {n}"), pose.map(usize::from));
+                for entry in list {
+                    let entry = contents(entry);
                     if !shapes.contains(&entry) {
                         shapes.push(entry);
                     }
@@ -242,6 +269,8 @@ fn reopen_elsewhere() -> Store {
 fn changes() -> impl Strategy<Value = Vec<Change>> {
     let one = prop_oneof![
         4 => (0_u8..5).prop_map(Change::Create),
+        2 => (0_u8..5, prop::collection::vec((0_u8..6, prop::option::of(0_u8..3)), 1..4))
+            .prop_map(|(n, list)| Change::Fill(n, list)),
         2 => (0_usize..8, 0_u8..5).prop_map(|(c, n)| Change::Rename(c, n)),
         1 => (0_usize..8).prop_map(Change::DeleteClass),
         6 => (0_usize..8, prop::collection::vec((0_u8..6, prop::option::of(0_u8..3)), 1..4))
@@ -262,15 +291,62 @@ proptest! {
     }
 
     #[test]
+    fn a_full_disk_loses_nothing(changes in changes(), fill_at in 0_u64..30, survivors in 0_usize..3) {
+        let directory = TempDir::new().unwrap();
+        run_full(directory.path(), &changes, fill_at, survivors);
+    }
+
+    #[test]
     fn a_failed_write_leaves_before_or_after(changes in changes(), fail_at in 0_u64..30) {
         let directory = TempDir::new().unwrap();
         run(directory.path(), &changes, Some(fail_at));
     }
 }
 
-#[test]
-fn every_write_of_a_life_fails_once() {
-    let life = [
+/// Runs the changes on a disk that is full from the `fill_at`-th write on until somebody frees space. Whatever it
+/// refuses is refused, the store takes writes again without being opened anew, and nothing acknowledged is gone.
+fn run_full(path: &Path, changes: &[Change], fill_at: u64, survivors: usize) -> bool {
+    let backend = Arc::new(MemoryBackend::new());
+    let store = Store::open_with(path, backend.clone()).unwrap();
+    let mut model = Model::new();
+    let mut was_full = false;
+    backend.fill_after(fill_at);
+    for what in changes.iter().filter(|c| !matches!(c, Change::Crash(_))) {
+        match change(&store, &model, what) {
+            Ok(after) => model = after,
+            Err(error) if refused(&error) => assert_eq!(expected(&model, what), None),
+            Err(StoreError::Full { .. }) => {
+                was_full = true;
+                assert!(matches!(store.health(), Health::ReadOnly { .. }));
+                let again = store.create_class(name("more"));
+                assert!(matches!(again, Err(StoreError::Full { .. })), "{again:?}");
+                backend.heal(survivors);
+                store.recover().unwrap();
+                assert_eq!(store.health(), Health::Ready);
+                let found = read(&store);
+                assert!(
+                    outline(&found) == outline(&model)
+                        || Some(&outline(&found)) == expected(&model, what).as_ref(),
+                    "{what:?} found the disk full and left {found:?}"
+                );
+                for id in model.keys().filter(|_| !matches!(what, Change::DeleteClass(_))) {
+                    assert!(found.contains_key(id), "an acknowledged class is gone");
+                }
+                model = found;
+            }
+            Err(error) => panic!("{what:?}: {error}"),
+        }
+        assert_eq!(read(&store), model, "after {what:?}");
+    }
+    drop(store);
+    let crashed = Arc::new(backend.after_crash(0));
+    assert_eq!(read(&Store::open_with(path, crashed).unwrap()), model);
+    was_full
+}
+
+/// A life with every kind of change.
+fn life() -> Vec<Change> {
+    vec![
         Change::Create(0),
         Change::Create(1),
         Change::AddShapes(0, vec![(0, None), (1, Some(0)), (1, Some(1))]),
@@ -279,8 +355,29 @@ fn every_write_of_a_life_fails_once() {
         Change::DeleteShape(0, 1),
         Change::AddShapes(0, vec![(3, None)]),
         Change::DeleteClass(1),
+        Change::Fill(3, vec![(4, None), (5, Some(2))]),
         Change::Create(1),
-    ];
+    ]
+}
+
+#[test]
+fn a_disk_is_full_once_at_every_write_of_a_life() {
+    let mut full = 0;
+    for survivors in [0, 1, 9] {
+        for fill_at in 0.. {
+            let directory = TempDir::new().unwrap();
+            if !run_full(directory.path(), &life(), fill_at, survivors) {
+                break;
+            }
+            full += 1;
+        }
+    }
+    assert!(full >= 54, "{full} times");
+}
+
+#[test]
+fn every_write_of_a_life_fails_once() {
+    let life = life();
     let directory = TempDir::new().unwrap();
     let writes = run(directory.path(), &life, None);
     assert!(writes >= 18, "{writes} writes");

@@ -3,9 +3,11 @@
 
 mod catalogue;
 mod faults;
+mod formats;
 mod jobs;
 mod recovery;
 mod snapshots;
+mod traps;
 
 use bytes::Bytes;
 use shapelex::mesh::{Format, PrepareReport};

@@ -122,9 +122,11 @@ async fn check_all(
             } else {
                 Patience::Batch
             };
+            let shared = state.clone();
             state
                 .compute
                 .run(patience, state.config.query_timeout, move |work| {
+                    let _reading = shared.memory.reserve_reading(mesh.bytes.len())?;
                     check_one(&mesh, poses, &limits, &options, &work.cancel)
                 })
         })

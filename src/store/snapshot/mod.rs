@@ -19,7 +19,7 @@ mod switch;
 mod write;
 
 pub use restore::Staged;
-pub(super) use switch::finish_restore;
+pub(super) use switch::{finish_restore, go_on};
 
 use super::{Store, StoreError, files};
 use crate::model::{ContentHash, Snapshot, SnapshotId, SnapshotOrigin};

@@ -1,14 +1,13 @@
 //! Bringing a snapshot back: unpacked and checked beside the state in use, then switched to.
 
 use super::super::backend::{Backend, Batch};
-use super::super::event::{files_of, get};
+use super::super::event::{files_of, get, put};
 use super::super::open::settle;
 use super::super::payload::Number;
-use super::super::sled_backend::SledBackend;
 use super::super::{Store, StoreError, StoreOptions, keys};
 use super::manifest::Manifest;
 use super::read::unpack;
-use super::switch::{UNPACKING, declare_ready, finish_restore, remove};
+use super::switch::{UNPACKING, declare_ready, go_on, remove};
 use crate::model::{Restored, SnapshotId};
 use std::fs::File;
 use std::io::Read;
@@ -91,13 +90,13 @@ impl Staged<'_> {
         inner.writable()?;
         let _files = inner.files.write().unwrap_or_else(PoisonError::into_inner);
         let mut writer = inner.writer();
-        copy_jobs(&*inner.backend, &self.directory)?;
+        carry_over(self.store, &self.directory)?;
         let data = self.store.path();
         declare_ready(data)?;
         let mut notes = Vec::new();
         let switched = inner
             .backend
-            .reopen(&mut || finish_restore(data))
+            .reopen(&mut || go_on(data))
             .and_then(|()| settle(data, &*inner.backend, &mut notes));
         *writer = switched.map_err(|e| inner.fail(e))?;
         for line in notes {
@@ -158,9 +157,29 @@ fn examine(directory: &Path, options: &StoreOptions, manifest: &Manifest) -> Res
     })
 }
 
-/// Copies the jobs into the unpacked records, and sees to it that no number of a generation is used twice.
-fn copy_jobs(from: &dyn Backend, directory: &Path) -> Result<(), StoreError> {
-    let to = SledBackend::open(&directory.join("sled"), 16 << 20)?;
+/// Copies what is this service's own into the unpacked state: its jobs and, where it has any, its API keys in place of
+/// those of the snapshot, so that nobody locks himself out and no revoked key works again.
+fn carry_over(store: &Store, directory: &Path) -> Result<(), StoreError> {
+    let to = Store::open(
+        directory,
+        &StoreOptions {
+            cache_bytes: 16 << 20,
+        },
+    )?;
+    let own = store.api_keys()?;
+    if !own.is_empty() {
+        for key in to.api_keys()? {
+            to.revoke_key(key.id)?;
+        }
+        for key in own {
+            to.create_key(key)?;
+        }
+    }
+    copy_jobs(&*store.inner.backend, &*to.inner.backend)
+}
+
+/// Copies the jobs, and sees to it that no number of a generation is used twice.
+fn copy_jobs(from: &dyn Backend, to: &dyn Backend) -> Result<(), StoreError> {
     let mut after: Option<Vec<u8>> = None;
     loop {
         let entries = from.scan(keys::JOB, after.as_deref(), CHUNK)?;
@@ -174,10 +193,10 @@ fn copy_jobs(from: &dyn Backend, directory: &Path) -> Result<(), StoreError> {
     }
     let last = |backend: &dyn Backend| get::<Number>(backend, keys::META_LAST_GENERATION);
     if let Some(Number(here)) = last(from)?
-        && last(&to)?.is_none_or(|Number(there)| there < here)
+        && last(to)?.is_none_or(|Number(there)| there < here)
     {
         let mut batch = Batch::default();
-        super::super::event::put(&mut batch, keys::META_LAST_GENERATION.to_vec(), &Number(here))?;
+        put(&mut batch, keys::META_LAST_GENERATION.to_vec(), &Number(here))?;
         to.apply(&batch)?;
     }
     to.flush()

@@ -26,6 +26,12 @@ pub(super) fn declare_ready(data: &Path) -> Result<(), StoreError> {
 /// Nothing of the data directory may be open but its lock.
 pub(in super::super) fn finish_restore(data: &Path) -> Result<(), StoreError> {
     remove(&data.join(UNPACKING))?;
+    go_on(data)?;
+    super::tidy(data)
+}
+
+/// Goes on with a switch that was declared, and leaves everything else alone.
+pub(in super::super) fn go_on(data: &Path) -> Result<(), StoreError> {
     let (ready, replaced) = (data.join(READY), data.join(REPLACED));
     if ready.exists() {
         tracing::warn!("switching to the restored state");
@@ -44,8 +50,7 @@ pub(in super::super) fn finish_restore(data: &Path) -> Result<(), StoreError> {
         remove(&ready)?;
         files::sync_directory(data)?;
     }
-    remove(&replaced)?;
-    super::tidy(data)
+    remove(&replaced)
 }
 
 fn rename(from: &Path, to: &Path) -> Result<(), StoreError> {
