@@ -7,8 +7,8 @@
 //!
 //! Data flows one way, and a module uses only what stands to its left:
 //!
-//! `cancel → mesh → spectral → signature → coding → parameters → ranking → pipeline → (baseline, sample, benchmark) → model → store
-//! → jobs → http → cli → main`
+//! `cancel → mesh → spectral → signature → coding → parameters → ranking → pipeline → (baseline, sample, benchmark) → figure →
+//! model → store → jobs → http → cli → main`
 //!
 //! The modules up to `benchmark` are the numeric core: no I/O, no clock, no globals; randomness comes from a seed in
 //! the parameters. They build without the `service` feature.
@@ -29,6 +29,8 @@ pub mod spectral;
 pub mod cli;
 #[cfg(feature = "service")]
 pub mod config;
+#[cfg(feature = "service")]
+pub mod figure;
 #[cfg(feature = "service")]
 pub mod http;
 #[cfg(feature = "service")]

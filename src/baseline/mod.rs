@@ -2,10 +2,15 @@
 //! Euclidean distance of their vectors and take the class of their nearest neighbour.
 
 pub mod bag_of_words;
+pub mod index;
 pub mod shape_dna;
 pub mod signature_distances;
 
 pub use bag_of_words::Vocabulary;
+pub use index::{
+    Baseline, BaselineClass, BaselineIndex, BaselineModel, BaselineShape, Nearest, baseline_parameters,
+    nearest_classes, thinned,
+};
 pub use shape_dna::shape_dna;
 pub use signature_distances::{SignatureDistances, sample_distances};
 

@@ -53,8 +53,12 @@ pub fn upload(
 ///
 /// # Errors
 /// As [`upload`].
-pub fn query(client: &Client, file: MeshFile) -> Result<Value, CallError> {
-    let path = format!("/v1/query?name={}", encode(&file.name));
+pub fn query(client: &Client, file: MeshFile, rank_by: Option<&str>) -> Result<Value, CallError> {
+    let mut path = format!("/v1/query?name={}", encode(&file.name));
+    if let Some(rank_by) = rank_by {
+        // Writing to a String cannot fail.
+        let _ = write!(path, "&rank_by={}", encode(rank_by));
+    }
     client.call("POST", &path, mesh_payload(file))
 }
 

@@ -167,7 +167,7 @@ fn query(client: &Client, specimens: &[Specimen]) -> Result<Vec<Answer>, CliErro
     let answers = specimens
         .par_iter()
         .map(|specimen| {
-            let value = api::query(client, file(specimen))
+            let value = api::query(client, file(specimen), None)
                 .map_err(|error| CliError::Failed(format!("{}: {error}", specimen.name)))?;
             progress.tick();
             Ok(Answer::new(&specimen.class, &specimen.name, value))

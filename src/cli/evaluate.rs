@@ -3,11 +3,12 @@
 use super::files::{LabelledFile, MeshFile, labelled_files};
 use super::progress::Progress;
 use super::refused::Refused;
-use super::{CliError, ParameterArgs, evaluation_report, output};
+use super::{CliError, ParameterArgs, evaluation_report, figures, output};
 use crate::benchmark::evaluate::Models;
 use crate::benchmark::retrieval::{RetrievalOutcome, coding_scores, judge_retrieval};
 use crate::benchmark::{Evaluation, LabelledShape, Protocol, evaluate};
 use crate::cancel::Cancel;
+use crate::figure::evaluation_figures;
 use crate::mesh::{Limits, MeshError, TriangleSoup, read, read_poses};
 use crate::parameters::Parameters;
 use crate::pipeline::describe_both;
@@ -64,6 +65,9 @@ pub struct EvaluateArgs {
     /// How many of the worst queries are listed
     #[arg(long, value_name = "COUNT", default_value_t = 10)]
     pub worst: usize,
+    /// Draw confusion, dissimilarity and embedding of the classes into this folder, an SVG file each
+    #[arg(long, value_name = "DIR")]
+    pub figures: Option<PathBuf>,
     /// The method's parameters.
     #[command(flatten)]
     pub parameters: ParameterArgs,
@@ -154,6 +158,9 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
             &|done, total| progress.set(done, total),
         )?;
         progress.finish();
+        if let Some(dir) = &args.figures {
+            figures::write(dir, &evaluation_figures(&evaluation)?)?;
+        }
         evaluation.queries.truncate(args.worst);
         protocols.push(Outcome {
             name: protocol.name(),

@@ -71,6 +71,7 @@ fn into_store(args: &ImportArgs, exported: &Exported, names: Vec<ClassName>) -> 
     }
     classes.sort_by_key(|class| class.class);
     store.put_generation_and_switch(&Generation {
+        baselines: None,
         number,
         parameters: exported.index.parameters.clone(),
         created_at: jiff::Timestamp::now(),

@@ -2,9 +2,10 @@
 
 use super::files::MeshFile;
 use super::refused::Refused;
-use super::{CliError, ParameterArgs, output};
+use super::{CliError, ParameterArgs, figures, output};
 use crate::cancel::Cancel;
-use crate::mesh::{Format, Limits, PrepareReport, TriangleSoup, read, read_poses};
+use crate::figure::{GalleryRow, as_large_as, gallery};
+use crate::mesh::{Format, Limits, PrepareReport, TriangleSoup, prepare, read, read_poses};
 use crate::parameters::Parameters;
 use crate::pipeline::describe_shape;
 use serde::Serialize;
@@ -20,6 +21,9 @@ pub struct InspectArgs {
     /// Sample this many poses of an animated glTF and inspect each
     #[arg(long, value_name = "COUNT")]
     pub poses: Option<usize>,
+    /// Draw every mesh, as read and as prepared, into one SVG file
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
     /// The method's parameters.
     #[command(flatten)]
     pub parameters: ParameterArgs,
@@ -45,10 +49,11 @@ struct Inspection {
 pub fn run(args: &InspectArgs, json: bool) -> Result<(), CliError> {
     let parameters = args.parameters.parameters()?;
     let mut refused = false;
+    let mut drawn = args.svg.is_some().then(Vec::new);
     for path in &args.files {
         let file = path.display().to_string();
         let result = MeshFile::load(path, Limits::default().max_bytes)
-            .and_then(|mesh| inspect(&file, &mesh, args.poses, &parameters));
+            .and_then(|mesh| inspect(&file, &mesh, args.poses, &parameters, drawn.as_mut()));
         match result {
             Ok(inspections) => {
                 for inspection in inspections {
@@ -69,14 +74,22 @@ pub fn run(args: &InspectArgs, json: bool) -> Result<(), CliError> {
             }
         }
     }
+    if let (Some(path), Some(rows)) = (&args.svg, &drawn)
+        && !rows.is_empty()
+    {
+        let columns = ["as read", "as prepared"].map(str::to_owned);
+        figures::write_one(path, &gallery("Meshes as read and as prepared", &columns, rows)?)?;
+    }
     if refused { Err(CliError::Reported) } else { Ok(()) }
 }
 
+/// Inspects a mesh, or its poses; adds a row of the gallery for each where one is drawn.
 fn inspect(
     file: &str,
     mesh: &MeshFile,
     poses: Option<usize>,
     parameters: &Parameters,
+    mut drawn: Option<&mut Vec<GalleryRow>>,
 ) -> Result<Vec<Inspection>, CliError> {
     let limits = Limits::default();
     let (format, soups): (Format, Vec<(Option<String>, TriangleSoup)>) = match poses {
@@ -95,6 +108,17 @@ fn inspect(
     soups
         .into_iter()
         .map(|(pose, soup)| {
+            if let Some(rows) = &mut drawn {
+                let (prepared, _) = prepare(soup.clone(), &parameters.prepare_options())?;
+                let prepared = TriangleSoup {
+                    vertices: prepared.vertices().to_vec(),
+                    faces: prepared.faces().to_vec(),
+                };
+                rows.push(GalleryRow {
+                    label: pose.clone().unwrap_or_else(|| mesh.name.clone()),
+                    meshes: vec![Some(soup.clone()), Some(as_large_as(&soup, prepared))],
+                });
+            }
             let description = describe_shape(soup, parameters, &Cancel::new(), &|_| ())?;
             Ok(Inspection {
                 file: file.to_owned(),

@@ -5,6 +5,7 @@ use super::files::MeshFile;
 use super::refused::Refused;
 use super::{CliError, api, dictionaries, output};
 use crate::cancel::Cancel;
+use crate::http::dto::parameters::QueryRankByName;
 use crate::mesh::{Limits, read};
 use crate::pipeline::{describe_query, rank};
 use crate::ranking::Index;
@@ -27,6 +28,21 @@ pub struct QueryArgs {
     /// How many classes are shown
     #[arg(long, value_name = "COUNT", default_value_t = 5)]
     pub top: usize,
+    /// What classes are ordered by; the index's own parameter where it is left out
+    #[arg(long, value_name = "METHOD", value_parser = rank_by)]
+    pub rank_by: Option<QueryRankByName>,
+}
+
+fn rank_by(text: &str) -> Result<QueryRankByName, String> {
+    QueryRankByName::ALL
+        .into_iter()
+        .find(|name| name.name() == text)
+        .ok_or_else(|| {
+            format!(
+                "expected one of {}",
+                QueryRankByName::ALL.map(QueryRankByName::name).join(", ")
+            )
+        })
 }
 
 enum Source {
@@ -46,7 +62,7 @@ pub fn run(args: &QueryArgs, json: bool) -> Result<(), CliError> {
     };
     let mut refused = false;
     for path in &args.files {
-        match source.rank(path, args.top) {
+        match source.rank(path, args.top, args.rank_by) {
             Ok(mut answer) => {
                 if json {
                     answer["file"] = json!(path.display().to_string());
@@ -69,12 +85,12 @@ pub fn run(args: &QueryArgs, json: bool) -> Result<(), CliError> {
 }
 
 impl Source {
-    fn rank(&self, path: &Path, top: usize) -> Result<Value, CliError> {
+    fn rank(&self, path: &Path, top: usize, rank_by: Option<QueryRankByName>) -> Result<Value, CliError> {
         let limits = Limits::default();
         let file = MeshFile::load(path, limits.max_bytes)?;
         let mut answer = match self {
-            Self::Service(client) => api::query(client, file)?,
-            Self::File(index) => rank_against(index, &file, &limits)?,
+            Self::Service(client) => api::query(client, file, rank_by.map(QueryRankByName::name))?,
+            Self::File(index) => rank_against(index, &file, rank_by, &limits)?,
         };
         if let Some(classes) = answer["classes"].as_array_mut() {
             classes.truncate(top);
@@ -85,12 +101,27 @@ impl Source {
 
 /// The same stages as the service's query, on an index that came out of a file. The answer has the members of the
 /// API's answer that have a meaning without a service.
-fn rank_against(index: &Index, file: &MeshFile, limits: &Limits) -> Result<Value, CliError> {
+fn rank_against(
+    index: &Index,
+    file: &MeshFile,
+    rank_by: Option<QueryRankByName>,
+    limits: &Limits,
+) -> Result<Value, CliError> {
+    let rank_by = match rank_by.map(QueryRankByName::method) {
+        None => index.parameters.rank_by,
+        Some(Ok(rank_by)) => rank_by,
+        Some(Err(_)) => {
+            return Err(CliError::Usage(
+                "--rank-by: a file of dictionaries has nothing for this method; query an index with --data or --server"
+                    .to_owned(),
+            ));
+        }
+    };
     let cancel = Cancel::new();
     let (format, soup) = read(&file.source(), limits)?;
     let description = describe_query(soup, &index.parameters, &cancel, &|_| ())?;
-    let ranking = rank(&description.views, index, index.parameters.rank_by, &cancel)
-        .map_err(crate::pipeline::PipelineError::from)?;
+    let ranking =
+        rank(&description.views, index, rank_by, &cancel).map_err(crate::pipeline::PipelineError::from)?;
     let classes: Vec<Value> = ranking
         .classes
         .iter()
@@ -120,7 +151,7 @@ fn rank_against(index: &Index, file: &MeshFile, limits: &Limits) -> Result<Value
         "warnings": description.report.warnings,
         "mesh": description.report,
         "eigenvalues": description.eigenvalues,
-        "rank_by": index.parameters.rank_by,
+        "rank_by": rank_by,
         "parameters": index.parameters,
     }))
 }
@@ -130,8 +161,9 @@ struct Row {
     rank: usize,
     class: RowClass,
     score: f64,
-    relative_error: f64,
-    mean_nonzeros: f64,
+    /// Only sparse coding knows these two.
+    relative_error: Option<f64>,
+    mean_nonzeros: Option<f64>,
     margin: Option<f64>,
 }
 
@@ -152,8 +184,8 @@ pub fn text(path: &Path, answer: &Value) -> String {
                 row.rank.to_string(),
                 row.class.name,
                 format!("{:.5}", row.score),
-                format!("{:.4}", row.relative_error),
-                format!("{:.2}", row.mean_nonzeros),
+                row.relative_error.map_or(String::new(), |e| format!("{e:.4}")),
+                row.mean_nonzeros.map_or(String::new(), |n| format!("{n:.2}")),
                 row.margin
                     .map_or(String::new(), |m| format!("{:.2} %", 100.0 * m)),
             ]

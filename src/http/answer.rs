@@ -5,12 +5,14 @@ use super::dto::class::ClassRef;
 use super::dto::query::{QueryAnswer, QueryOptions, RankedClass, RankedShape};
 use super::metrics;
 use super::problem::Problem;
-use super::problem_from::index_empty;
+use super::problem_from::{baselines_missing, index_empty};
+use super::ranked::Ranked;
 use super::state::Parts;
 use super::uploaded::UploadedMesh;
+use crate::baseline::baseline_parameters;
 use crate::jobs::LiveIndex;
 use crate::model::ClassId;
-use crate::pipeline::{Stage, describe_query, rank};
+use crate::pipeline::{Stage, describe_query, describe_shape, rank};
 use crate::ranking::Index;
 use crate::store::StoreError;
 use std::cell::RefCell;
@@ -20,7 +22,7 @@ use std::time::{Duration, Instant};
 /// Answers a query. Blocks on the computation: call it on the compute pool.
 ///
 /// # Errors
-/// `index_empty`, and those of reading, describing and ranking.
+/// `index_empty`, `baselines_missing`, and those of reading, describing and ranking.
 pub fn answer(
     state: &Parts,
     live: &LiveIndex,
@@ -42,10 +44,29 @@ pub fn answer(
     let observer = |stage| watch.begin(stage);
     observer(Stage::Read);
     let (format, soup) = mesh.read(&state.config.limits)?;
-    let description = describe_query(soup, parameters, &work.cancel, &observer)?;
-    observer(Stage::Ranking);
-    let rank_by = options.rank_by.map_or(parameters.rank_by, Into::into);
-    let ranking = rank(&description.views, &index, rank_by, &work.cancel)?;
+    let named = options.rank_by.unwrap_or(parameters.rank_by.into());
+    let (description, ranking) = match named.method() {
+        Ok(rank_by) => {
+            let description = describe_query(soup, parameters, &work.cancel, &observer)?;
+            observer(Stage::Ranking);
+            let ranking = rank(&description.views, &index, rank_by, &work.cancel)?;
+            (description, Ranked::from(ranking))
+        }
+        Err(baseline) => {
+            let baselines = live
+                .baselines
+                .as_ref()
+                .ok_or_else(|| baselines_missing(named.name()))?;
+            let parameters = baseline_parameters(parameters);
+            let description = describe_shape(soup, &parameters, &work.cancel, &observer)?;
+            observer(Stage::Ranking);
+            let present = |label: &str| names.contains_key(label);
+            let nearest = baselines
+                .nearest(&description, baseline, &present)
+                .ok_or_else(|| baselines_missing(named.name()))?;
+            (description, Ranked::from(nearest))
+        }
+    };
     let stages = watch.end();
     for (stage, took) in &stages {
         metrics::time_stage(*stage, *took);
@@ -56,23 +77,21 @@ pub fn answer(
     };
     let top = options.top.unwrap_or(usize::MAX);
     let compared = ranking.classes.len();
-    let classes = ranking
-        .classes
-        .into_iter()
-        .take(top)
-        .enumerate()
-        .map(|(i, c)| RankedClass {
+    let classes = ranking.classes.into_iter().take(top).enumerate().map(|(i, c)| {
+        let coded = c.coded;
+        RankedClass {
             rank: i + 1,
             class: class_of(&c.label),
             score: c.score,
-            reconstruction_error: c.frobenius_error,
-            relative_error: c.relative_error,
-            mean_objective: c.mean_objective,
-            trimmed_objective: c.trimmed_objective,
-            mean_nonzeros: c.mean_nonzeros,
-            hypothesis: c.hypothesis.into(),
+            reconstruction_error: coded.as_ref().map(|c| c.frobenius_error),
+            relative_error: coded.as_ref().map(|c| c.relative_error),
+            mean_objective: coded.as_ref().map(|c| c.mean_objective),
+            trimmed_objective: coded.as_ref().map(|c| c.trimmed_objective),
+            mean_nonzeros: coded.as_ref().map(|c| c.mean_nonzeros),
+            hypothesis: coded.as_ref().map(|c| c.hypothesis.into()),
             margin: c.margin,
-        });
+        }
+    });
     let shapes = ranking
         .shapes
         .into_iter()
@@ -97,7 +116,7 @@ pub fn answer(
         mesh: description.report.into(),
         eigenvalues: description.eigenvalues,
         generation: generation.number,
-        rank_by: rank_by.into(),
+        rank_by: named,
         parameters: parameters.clone().into(),
         timings_ms: timings(&stages, work.waited, began.elapsed()),
     })

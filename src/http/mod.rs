@@ -15,6 +15,7 @@ pub mod metrics;
 pub mod openapi;
 pub mod problem;
 mod problem_from;
+mod ranked;
 pub mod respond;
 pub mod router;
 mod routes;

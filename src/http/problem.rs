@@ -96,6 +96,7 @@ codes! {
     IndexEmpty, "index_empty", 409, "No class is indexed yet";
     NothingToIndex, "nothing_to_index", 409, "There are no shapes to learn from";
     IndexIncomplete, "index_incomplete", 409, "A class lacks a dictionary the query needs";
+    BaselinesMissing, "baselines_missing", 409, "The index was learnt without what this ranking needs";
     // --- load and faults ---
     QueueFull, "queue_full", 503, "The job queue is full";
     Overloaded, "overloaded", 503, "All workers are busy";

@@ -118,6 +118,19 @@ pub fn index_empty() -> Problem {
     .with("next", "/v1/reindex")
 }
 
+/// The index knows nothing for the baselines: says what to do next.
+pub fn baselines_missing(rank_by: &str) -> Problem {
+    Problem::new(
+        Code::BaselinesMissing,
+        format!(
+            "the index was learnt without what {rank_by} needs; POST /v1/reindex, wait for its job and ask again, or \
+             rank by objective"
+        ),
+    )
+    .with("rank_by", rank_by)
+    .with("next", "/v1/reindex")
+}
+
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
         let detail = error.to_string();

@@ -3,6 +3,7 @@
 //! Jobs run one at a time, in the order they were asked for, each on a pool of a few threads. A job that was running
 //! when the process died is queued again at the next start; one that was running at shutdown goes back to the queue.
 
+mod baselines;
 mod describe;
 pub mod error;
 mod failure;

@@ -1,8 +1,9 @@
 //! Learning the index: describe the shapes, learn the classes, switch.
 
+use super::baselines::learn_baselines;
 use super::describe::Describer;
 use super::failure::{ReindexError, code};
-use super::live::LiveIndex;
+use super::live::{LiveIndex, load_baselines};
 use super::plan::{Plan, ToLearn, plan, shape_key, skipped};
 use super::progress::Progress;
 use crate::cancel::Cancel;
@@ -64,33 +65,35 @@ pub(super) fn reindex(request: &Reindex<'_>, live: &ArcSwap<LiveIndex>) -> Resul
         ..ReindexReport::default()
     };
     let mut classes = keep;
-    learn_classes(request, &parameters, &learn, &mut classes, &mut report)?;
+    let kept = classes.len();
+    let describer = Describer {
+        store,
+        limits: request.limits,
+        parameters: &parameters,
+        fingerprint: parameters.description_fingerprint(),
+        cancel: request.cancel,
+    };
+    learn_classes(request, &describer, &learn, &mut classes, &mut report)?;
+    let baselines = learn_baselines(request, &describer, current.as_ref(), &classes, kept)?;
     stop_if_cancelled(request)?;
     request.progress.begin("switch", 1);
-    let generation = switch(store, current, parameters, classes, live)?;
+    let generation = switch(store, current, parameters, classes, baselines, live)?;
     request.progress.advance();
     Ok(Outcome { generation, report })
 }
 
-fn stop_if_cancelled(request: &Reindex<'_>) -> Result<(), ReindexError> {
+pub(super) fn stop_if_cancelled(request: &Reindex<'_>) -> Result<(), ReindexError> {
     request.cancel.check().map_err(|_| ReindexError::Cancelled)
 }
 
 /// Describes and learns what the plan asks for; adds to the classes of the generation and to the report.
 fn learn_classes(
     request: &Reindex<'_>,
-    parameters: &Parameters,
+    describer: &Describer<'_>,
     learn: &[ToLearn],
     classes: &mut Vec<GenerationClass>,
     report: &mut ReindexReport,
 ) -> Result<(), ReindexError> {
-    let describer = Describer {
-        store: request.store,
-        limits: request.limits,
-        parameters,
-        fingerprint: parameters.description_fingerprint(),
-        cancel: request.cancel,
-    };
     let shapes: Vec<&Shape> = learn.iter().flat_map(|class| &class.shapes).collect();
     request.progress.begin("describe shapes", shapes.len());
     let described = describer.describe_all(&shapes, request.progress)?;
@@ -125,7 +128,7 @@ fn learn_classes(
                     None => good.push(shape),
                 }
             }
-            let learnt = learn_class(request, parameters, &describer, class, &good, failed);
+            let learnt = learn_class(request, describer, class, &good, failed);
             request.progress.advance();
             learnt
         })
@@ -163,13 +166,13 @@ fn learn_classes(
 
 fn learn_class(
     request: &Reindex<'_>,
-    parameters: &Parameters,
     describer: &Describer<'_>,
     class: &ToLearn,
     shapes: &[&Shape],
     mut failed: Vec<FailedShape>,
 ) -> Result<Learnt, ReindexError> {
     stop_if_cancelled(request)?;
+    let parameters = describer.parameters;
     let (id, name) = (class.class.id, class.class.name.as_str());
     let mut descriptions: Vec<(&Shape, Description)> = Vec::new();
     for shape in shapes {
@@ -256,6 +259,7 @@ fn switch(
     current: Option<Generation>,
     parameters: Parameters,
     mut classes: Vec<GenerationClass>,
+    baselines: Option<String>,
     live: &ArcSwap<LiveIndex>,
 ) -> Result<Option<u64>, ReindexError> {
     // Classes that were deleted while they were learnt.
@@ -264,7 +268,10 @@ fn switch(
     let served = live.load().generation.as_ref().map(|g| g.number);
     let same = match &current {
         Some(current) => {
-            served == Some(current.number) && current.parameters == parameters && current.classes == classes
+            served == Some(current.number)
+                && current.parameters == parameters
+                && current.classes == classes
+                && current.baselines == baselines
         }
         None => classes.is_empty() && store.parameters()? == parameters,
     };
@@ -276,14 +283,17 @@ fn switch(
         parameters,
         created_at: Timestamp::now(),
         classes,
+        baselines,
     };
     // Loaded before the switch, so that nothing can fail after it.
     let index = store.load_index(&generation)?;
+    let baselines = load_baselines(store, &generation)?;
     store.put_generation_and_switch(&generation)?;
     let number = generation.number;
     live.store(Arc::new(LiveIndex {
         generation: Some(generation),
         index,
+        baselines,
     }));
     Ok(Some(number))
 }

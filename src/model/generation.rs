@@ -18,6 +18,8 @@ pub struct Generation {
     pub created_at: Timestamp,
     /// Its classes, by identifier.
     pub classes: Vec<GenerationClass>,
+    /// The store's key of what the baselines' descriptors share; `None` where it was learnt without.
+    pub baselines: Option<String>,
 }
 
 impl Generation {

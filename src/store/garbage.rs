@@ -1,7 +1,7 @@
 //! Removing what nothing refers to any more: dictionaries of earlier generations, stored files without a shape, cached
 //! signatures of other parameters, unfinished temporary files.
 
-use super::{Batch, Store, StoreError, files, keys, record};
+use super::{Batch, Store, StoreError, baselines, files, keys, record};
 use crate::model::{ContentHash, Generation, Shape};
 use crate::parameters::Parameters;
 use std::collections::BTreeSet;
@@ -12,6 +12,8 @@ use std::sync::PoisonError;
 pub struct Garbage {
     /// Dictionaries.
     pub dictionaries: usize,
+    /// What the baselines needed of earlier generations.
+    pub baselines: usize,
     /// Stored files.
     pub originals: usize,
     /// Cached signatures.
@@ -32,6 +34,7 @@ impl Store {
         let generation = self.generation()?;
         let mut garbage = Garbage {
             dictionaries: self.collect_dictionaries(generation.as_ref())?,
+            baselines: self.collect_baselines(generation.as_ref())?,
             ..Garbage::default()
         };
         let _gate = self.inner.files.write().unwrap_or_else(PoisonError::into_inner);
@@ -65,13 +68,25 @@ impl Store {
             })
             .map(|key| keys::dictionary(key))
             .collect();
+        self.collect_records(keys::DICTIONARY, &kept)
+    }
+
+    fn collect_baselines(&self, generation: Option<&Generation>) -> Result<usize, StoreError> {
+        let mut kept = BTreeSet::new();
+        if let Some((generation, model)) = generation.and_then(|g| Some((g, g.baselines.as_ref()?))) {
+            kept.insert(keys::baseline(model));
+            let of = |class| keys::baseline(&baselines::class_key(class, model));
+            kept.extend(generation.classes.iter().map(of));
+        }
+        self.collect_records(keys::BASELINE, &kept)
+    }
+
+    /// Removes the records of a prefix that are not kept.
+    fn collect_records(&self, prefix: &[u8], kept: &BTreeSet<Vec<u8>>) -> Result<usize, StoreError> {
         let mut batch = Batch::default();
         let mut after: Option<Vec<u8>> = None;
         loop {
-            let entries = self
-                .inner
-                .backend
-                .scan(keys::DICTIONARY, after.as_deref(), CHUNK)?;
+            let entries = self.inner.backend.scan(prefix, after.as_deref(), CHUNK)?;
             let Some((last, _)) = entries.last() else { break };
             after = Some(last.clone());
             for (key, _) in entries {

@@ -10,6 +10,7 @@ pub(super) const OWNER: &[u8] = b"owner/";
 pub(super) const IDENTITY: &[u8] = b"identity/";
 pub(super) const REFERENCE: &[u8] = b"reference/";
 pub(super) const DICTIONARY: &[u8] = b"dictionary/";
+pub(super) const BASELINE: &[u8] = b"baseline/";
 pub(super) const GENERATION: &[u8] = b"generation/";
 pub(super) const JOB: &[u8] = b"job/";
 pub(super) const QUEUE: &[u8] = b"queue/";
@@ -64,6 +65,10 @@ pub(super) fn reference(content: ContentHash, id: ShapeId) -> Vec<u8> {
 
 pub(super) fn dictionary(key: &str) -> Vec<u8> {
     join(&[DICTIONARY, key.as_bytes()])
+}
+
+pub(super) fn baseline(key: &str) -> Vec<u8> {
+    join(&[BASELINE, key.as_bytes()])
 }
 
 pub(super) fn generation(number: u64) -> Vec<u8> {

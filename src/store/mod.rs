@@ -10,6 +10,7 @@
 
 mod api_keys;
 pub mod backend;
+mod baselines;
 mod catalogue;
 mod catalogue_log;
 mod dictionaries;

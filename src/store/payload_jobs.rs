@@ -1,4 +1,4 @@
-//! The payloads of generations and jobs, version 1.
+//! The payloads of generations, versions 1 and 2, and of jobs, version 1.
 
 use super::payload::{from_json, instant, only, pack, to_json, unpack};
 use super::record::{Family, Record};
@@ -16,6 +16,13 @@ struct GenerationV1 {
     classes: Vec<GenerationClassV1>,
 }
 
+/// Version 1 with the key of the baselines' model after it.
+#[derive(Serialize, Deserialize)]
+struct GenerationV2 {
+    first: GenerationV1,
+    baselines: Option<String>,
+}
+
 #[derive(Serialize, Deserialize)]
 struct GenerationClassV1 {
     class: [u8; 16],
@@ -31,7 +38,7 @@ struct GenerationClassV1 {
 
 impl Record for Generation {
     const FAMILY: Family = Family::Generation;
-    const VERSION: u16 = 1;
+    const VERSION: u16 = 2;
 
     fn encode(&self) -> Result<Vec<u8>, String> {
         let classes = self
@@ -55,17 +62,28 @@ impl Record for Generation {
                 })
             })
             .collect::<Result<_, String>>()?;
-        pack(&GenerationV1 {
-            number: self.number,
-            parameters: to_json(&self.parameters)?,
-            created_at: self.created_at.as_nanosecond(),
-            classes,
+        pack(&GenerationV2 {
+            first: GenerationV1 {
+                number: self.number,
+                parameters: to_json(&self.parameters)?,
+                created_at: self.created_at.as_nanosecond(),
+                classes,
+            },
+            baselines: self.baselines.clone(),
         })
     }
 
     fn decode(version: u16, payload: &[u8]) -> Result<Self, String> {
-        only(version, 1)?;
-        let v: GenerationV1 = unpack(payload)?;
+        let GenerationV2 { first: v, baselines } = match version {
+            1 => GenerationV2 {
+                first: unpack(payload)?,
+                baselines: None,
+            },
+            other => {
+                only(other, 2)?;
+                unpack(payload)?
+            }
+        };
         let classes = v
             .classes
             .into_iter()
@@ -95,6 +113,7 @@ impl Record for Generation {
             parameters: from_json(&v.parameters)?,
             created_at: instant(v.created_at)?,
             classes,
+            baselines,
         })
     }
 }
@@ -172,5 +191,28 @@ impl Record for Job {
             generation: v.generation,
             result: v.result.as_deref().map(from_json).transpose()?,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameters::Parameters;
+
+    #[test]
+    fn a_generation_of_version_1_has_no_baselines() {
+        let first = || GenerationV1 {
+            number: 3,
+            parameters: to_json(&Parameters::default()).unwrap(),
+            created_at: 0,
+            classes: Vec::new(),
+        };
+        let old = Generation::decode(1, &pack(&first()).unwrap()).unwrap();
+        assert_eq!((old.number, &old.baselines), (3, &None));
+        let mut new = old;
+        new.baselines = Some("model-x".to_owned());
+        let again = Generation::decode(Generation::VERSION, &new.encode().unwrap()).unwrap();
+        assert_eq!(again, new);
+        assert!(Generation::decode(3, &new.encode().unwrap()).is_err());
     }
 }

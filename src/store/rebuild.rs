@@ -17,7 +17,13 @@ use std::path::Path;
 const CHUNK: usize = 256;
 
 /// Families the log cannot give back; their intact records are carried over.
-const CARRIED: [&[u8]; 4] = [keys::DICTIONARY, keys::GENERATION, keys::JOB, keys::QUEUE];
+const CARRIED: [&[u8]; 5] = [
+    keys::DICTIONARY,
+    keys::BASELINE,
+    keys::GENERATION,
+    keys::JOB,
+    keys::QUEUE,
+];
 
 /// Opens the records, rebuilding them first where they are damaged.
 pub(super) fn open_records(

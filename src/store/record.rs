@@ -48,6 +48,10 @@ pub enum Family {
     Signatures = 12,
     /// An API key.
     ApiKey = 13,
+    /// What the baselines' descriptors of a generation share.
+    BaselineModel = 15,
+    /// The baselines' descriptors of a class's shapes.
+    Baselines = 16,
 }
 
 /// A value with a family, a version and an encoding.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A module may use only what stands to its left.
-const ORDER: [&str; 18] = [
+const ORDER: [&str; 19] = [
     "cancel",
     "mesh",
     "spectral",
@@ -16,6 +16,7 @@ const ORDER: [&str; 18] = [
     "baseline",
     "sample",
     "benchmark",
+    "figure",
     "model",
     "store",
     "jobs",

@@ -2,6 +2,7 @@
 #![cfg(feature = "service")]
 
 mod bad_input;
+mod baselines;
 mod batch;
 mod catalogue;
 mod contract;

@@ -1,5 +1,6 @@
 //! The method's parameters on the wire.
 
+use crate::baseline::Baseline;
 use crate::mesh::Components;
 use crate::parameters::{Hypothesis, Parameters, Preset, RankBy};
 use crate::signature::descriptor::{Descriptor, WksRange};
@@ -51,6 +52,75 @@ mirrored! {
         Frobenius,
     }
 }
+/// What a query's classes are ordered by: the ways of sparse coding, and the methods the paper compares with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum QueryRankByName {
+    /// Mean Lasso objective per signature.
+    Objective,
+    /// Mean of the smallest 80 % of the objectives.
+    TrimmedObjective,
+    /// The reconstruction error of Eq. 5.
+    Frobenius,
+    /// Distance of the first 13 eigenvalues to those of the class's nearest shape.
+    ShapeDna,
+    /// The same with eigenvalues divided by the first.
+    ShapeDnaRelative,
+    /// Distance of the histograms of signature distances.
+    SignatureDistances,
+    /// Distance of the histograms of words.
+    BagOfWords,
+}
+
+impl From<RankBy> for QueryRankByName {
+    fn from(value: RankBy) -> Self {
+        match value {
+            RankBy::Objective => Self::Objective,
+            RankBy::TrimmedObjective => Self::TrimmedObjective,
+            RankBy::Frobenius => Self::Frobenius,
+        }
+    }
+}
+
+impl QueryRankByName {
+    /// Every way, sparse coding first.
+    pub const ALL: [Self; 7] = [
+        Self::Objective,
+        Self::TrimmedObjective,
+        Self::Frobenius,
+        Self::ShapeDna,
+        Self::ShapeDnaRelative,
+        Self::SignatureDistances,
+        Self::BagOfWords,
+    ];
+
+    /// The way of sparse coding, or the method to rank by instead.
+    pub fn method(self) -> Result<RankBy, Baseline> {
+        match self {
+            Self::Objective => Ok(RankBy::Objective),
+            Self::TrimmedObjective => Ok(RankBy::TrimmedObjective),
+            Self::Frobenius => Ok(RankBy::Frobenius),
+            Self::ShapeDna => Err(Baseline::ShapeDna),
+            Self::ShapeDnaRelative => Err(Baseline::ShapeDnaRelative),
+            Self::SignatureDistances => Err(Baseline::SignatureDistances),
+            Self::BagOfWords => Err(Baseline::BagOfWords),
+        }
+    }
+
+    /// The name on the wire.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Objective => "objective",
+            Self::TrimmedObjective => "trimmed_objective",
+            Self::Frobenius => "frobenius",
+            Self::ShapeDna => "shape_dna",
+            Self::ShapeDnaRelative => "shape_dna_relative",
+            Self::SignatureDistances => "signature_distances",
+            Self::BagOfWords => "bag_of_words",
+        }
+    }
+}
+
 mirrored! {
     /// A way to prepare a query.
     HypothesisName of Hypothesis {

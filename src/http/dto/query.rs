@@ -1,7 +1,7 @@
 //! Queries and their answers on the wire.
 
 use super::class::ClassRef;
-use super::parameters::{HypothesisName, ParametersDto, RankByName};
+use super::parameters::{HypothesisName, ParametersDto, QueryRankByName};
 use super::shape::ReportDto;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -15,39 +15,43 @@ pub struct QueryOptions {
     /// How many classes (and nearest shapes) are answered at most; all where it is left out.
     #[param(minimum = 1)]
     pub top: Option<usize>,
-    /// What classes are ordered by; the index's own parameter where it is left out.
+    /// What classes are ordered by; the index's own parameter where it is left out. `shape_dna`, `shape_dna_relative`,
+    /// `signature_distances` and `bag_of_words` rank by the distance to a class's nearest training shape instead of
+    /// sparse coding.
     #[param(inline)]
-    pub rank_by: Option<RankByName>,
+    pub rank_by: Option<QueryRankByName>,
     /// What a raw body is called, such as `dog0.obj`.
     pub name: Option<String>,
 }
 
-/// How well a class regenerates the query.
+/// How well a class regenerates the query, or how near it is. What only sparse coding knows is `null` where the
+/// classes are ranked by another method.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct RankedClass {
     /// 1 is best.
     pub rank: usize,
     /// The class.
     pub class: ClassRef,
-    /// What the ranking is ordered by, ascending.
+    /// What the ranking is ordered by, ascending; by a method other than sparse coding the distance to the class's
+    /// nearest training shape.
     pub score: f64,
     /// ‖S − DA‖, the paper's Eq. 5.
-    pub reconstruction_error: f64,
+    pub reconstruction_error: Option<f64>,
     /// The same over ‖S‖, 0 to about 1.
-    pub relative_error: f64,
+    pub relative_error: Option<f64>,
     /// Mean Lasso objective per signature.
-    pub mean_objective: f64,
+    pub mean_objective: Option<f64>,
     /// Mean of the smallest 80 % of the objectives.
-    pub trimmed_objective: f64,
+    pub trimmed_objective: Option<f64>,
     /// Mean number of atoms a signature was built from.
-    pub mean_nonzeros: f64,
+    pub mean_nonzeros: Option<f64>,
     /// The way of preparing the query the score comes from.
-    pub hypothesis: HypothesisName,
+    pub hypothesis: Option<HypothesisName>,
     /// By how much the next class is worse, relative to it; `null` for the last.
     pub margin: Option<f64>,
 }
 
-/// How well a single training shape regenerates the query.
+/// How well a single training shape regenerates the query, or how near it is.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct RankedShape {
     /// 1 is best.
@@ -58,8 +62,8 @@ pub struct RankedShape {
     pub class: ClassRef,
     /// What the ranking is ordered by, ascending.
     pub score: f64,
-    /// ‖S − DA‖, the paper's Eq. 5.
-    pub reconstruction_error: f64,
+    /// ‖S − DA‖, the paper's Eq. 5; `null` where the ranking is not by sparse coding.
+    pub reconstruction_error: Option<f64>,
 }
 
 /// The answer to a query.
@@ -69,13 +73,14 @@ pub struct QueryAnswer {
     pub name: String,
     /// Classes, best first.
     pub classes: Vec<RankedClass>,
-    /// Training shapes, best first, where the index has dictionaries of single shapes.
+    /// Training shapes, best first, where the index has dictionaries of single shapes or the ranking is not by sparse
+    /// coding.
     pub nearest_shapes: Vec<RankedShape>,
     /// Relative margin of the best class to the runner-up, 0 to 1; 1 where there is only one.
     pub confidence: f64,
     /// Classes that were compared with.
     pub compared: usize,
-    /// Signatures that were coded.
+    /// Signatures that were coded; 0 where the ranking is not by sparse coding.
     pub signatures: usize,
     /// The mesh's format.
     pub format: String,
@@ -88,7 +93,7 @@ pub struct QueryAnswer {
     /// The generation of the index that answered.
     pub generation: u64,
     /// What the classes were ordered by.
-    pub rank_by: RankByName,
+    pub rank_by: QueryRankByName,
     /// The parameters of the index.
     pub parameters: ParametersDto,
     /// Milliseconds by stage: `wait`, `read`, `prepare`, `laplacian`, `eigenpairs`, `signatures`, `ranking` and

@@ -1,0 +1,153 @@
+//! Points in a plane with their names (the paper's Figure 6).
+
+use super::FigureError;
+use super::axes::{Axis, legend, mark, mesh};
+use super::canvas::{self, UNIT, draw, font, label, number, size, text_width};
+use super::palette::{INK, series};
+use plotters::chart::ChartBuilder;
+use plotters::style::text_anchor::{HPos, VPos};
+
+/// Figures with more points name groups, not points.
+const NAMED: usize = 60;
+/// Size of a name, in pixels.
+const NAME: f64 = 12.0;
+
+/// A point with its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EmbeddedPoint {
+    /// Its name.
+    pub label: String,
+    /// What it belongs to; points of one group share colour and mark. Empty where there are no groups.
+    pub group: String,
+    /// Its place.
+    pub at: (f64, f64),
+}
+
+/// Draws points on equal scales in x and y. Up to 60 points are named beside their marks, where the names cover one
+/// another least; with more, or where points have groups, a legend names the groups.
+///
+/// # Errors
+/// [`FigureError::Empty`] without points, or where one is not finite.
+pub fn embedding(title: &str, unit: &str, points: &[EmbeddedPoint]) -> Result<String, FigureError> {
+    let finite = points.iter().all(|p| p.at.0.is_finite() && p.at.1.is_finite());
+    if points.is_empty() || !finite {
+        return Err(FigureError::Empty { what: "points" });
+    }
+    let mut groups: Vec<String> = Vec::new();
+    for point in points {
+        if !point.group.is_empty() && !groups.contains(&point.group) {
+            groups.push(point.group.clone());
+        }
+    }
+    let middle = |pick: fn(&EmbeddedPoint) -> f64| {
+        let low = points.iter().map(pick).fold(f64::INFINITY, f64::min);
+        let high = points.iter().map(pick).fold(f64::NEG_INFINITY, f64::max);
+        (0.5 * (low + high), 0.5 * (high - low))
+    };
+    let (x, half_x) = middle(|p| p.at.0);
+    let (y, half_y) = middle(|p| p.at.1);
+    // The plot is 560 × 440 pixels; a unit is as long across as up.
+    let half = (half_y * 1.15).max(half_x * 1.25 * 440.0 / 560.0).max(1e-12);
+    let side = if groups.is_empty() { 16.0 } else { 230.0 };
+    let description = format!(
+        "Points in a plane, near where alike: {}.",
+        points
+            .iter()
+            .take(NAMED)
+            .map(|p| format!("{} at {}, {}", p.label, number(p.at.0), number(p.at.1)))
+            .collect::<Vec<_>>()
+            .join("; ")
+    );
+    let width = 16.0 + 66.0 + 560.0 + side;
+    draw(title, &description, (width, 48.0 + 440.0 + 46.0 + 16.0), |root| {
+        let area = root.margin(size(48.0), size(16.0), size(16.0), size(side));
+        let wide = half * 560.0 / 440.0;
+        let mut chart = ChartBuilder::on(&area)
+            .x_label_area_size(size(46.0))
+            .y_label_area_size(size(66.0))
+            .build_cartesian_2d(x - wide..x + wide, y - half..y + half)?;
+        let format = |v: &f64| number(if v.abs() < half * 1e-9 { 0.0 } else { *v });
+        let (first, second) = (format!("first axis ({unit})"), format!("second axis ({unit})"));
+        let axis = |label| Axis {
+            label,
+            ticks: 6,
+            format: &format,
+        };
+        mesh(&mut chart, &axis(&first), &axis(&second))?;
+        let places: Vec<(i32, i32)> = points.iter().map(|p| chart.backend_coord(&p.at)).collect();
+        let kind = |p: &EmbeddedPoint| groups.iter().position(|g| *g == p.group).unwrap_or(0);
+        for (point, &at) in points.iter().zip(&places) {
+            mark(root, at, kind(point))?;
+        }
+        if points.len() <= NAMED {
+            name_points(root, points, &places, &kind)?;
+        }
+        if groups.is_empty() {
+            return Ok(());
+        }
+        legend(root, &groups, (width - side + 20.0, 66.0), false)
+    })
+}
+
+/// A box in pixels: left, top, right, bottom.
+type Bounds = [f64; 4];
+
+/// Writes each name at the one of eight places around its mark that covers least of what is there already.
+fn name_points(
+    root: &canvas::Area<'_>,
+    points: &[EmbeddedPoint],
+    places: &[(i32, i32)],
+    kind: &dyn Fn(&EmbeddedPoint) -> usize,
+) -> Result<(), FigureError> {
+    let pixel = |v: i32| f64::from(v) / f64::from(UNIT);
+    let mut taken: Vec<Bounds> = places
+        .iter()
+        .map(|&(x, y)| [pixel(x) - 5.0, pixel(y) - 5.0, pixel(x) + 5.0, pixel(y) + 5.0])
+        .collect();
+    for (point, &(x, y)) in points.iter().zip(places) {
+        let text = label(&point.label);
+        let (width, height) = (text_width(&text, NAME), NAME);
+        let (x, y) = (pixel(x), pixel(y));
+        let rise = height / 2.0 + 6.0;
+        // Where the text is anchored, the preferred place first.
+        let candidates = [
+            (x + 9.0, y, HPos::Left),
+            (x - 9.0, y, HPos::Right),
+            (x, y - rise - 1.0, HPos::Center),
+            (x, y + rise + 1.0, HPos::Center),
+            (x + 5.0, y - rise, HPos::Left),
+            (x + 5.0, y + rise, HPos::Left),
+            (x - 5.0, y - rise, HPos::Right),
+            (x - 5.0, y + rise, HPos::Right),
+        ];
+        let bounds = |(x, y, anchor): (f64, f64, HPos)| -> Bounds {
+            let left = match anchor {
+                HPos::Left => x,
+                HPos::Center => x - width / 2.0,
+                HPos::Right => x - width,
+            };
+            [left, y - height / 2.0, left + width, y + height / 2.0]
+        };
+        let covered = |at| -> f64 { taken.iter().map(|b| overlap(&bounds(at), b)).sum() };
+        let best = candidates
+            .into_iter()
+            .min_by(|a, b| covered(*a).total_cmp(&covered(*b)))
+            .unwrap_or(candidates[0]);
+        taken.push(bounds(best));
+        let colour = if point.group.is_empty() {
+            INK
+        } else {
+            series(kind(point))
+        };
+        let (x, y, anchor) = best;
+        canvas::write(root, &text, (x, y), &font(NAME, colour, anchor, VPos::Center))?;
+    }
+    Ok(())
+}
+
+/// Area two boxes share.
+fn overlap(a: &Bounds, b: &Bounds) -> f64 {
+    let across = a[2].min(b[2]) - a[0].max(b[0]);
+    let down = a[3].min(b[3]) - a[1].max(b[1]);
+    across.max(0.0) * down.max(0.0)
+}

@@ -1,0 +1,97 @@
+//! What the baselines need of an index: learnt with it, kept with its generation.
+
+use super::describe::Describer;
+use super::failure::ReindexError;
+use super::reindex::{Reindex, stop_if_cancelled};
+use crate::baseline::{BaselineModel, thinned};
+use crate::model::{Generation, GenerationClass, Shape};
+use crate::store::StoreError;
+use rayon::prelude::*;
+
+/// Shapes at most that take part in finding what all share, evenly spread over the classes.
+const LEARNT_FROM: usize = 128;
+
+/// Describes the shapes of all classes for the baselines, where that is not kept already; returns the key of the model
+/// they share, `None` where no shape can be described.
+///
+/// The model of the generation before is kept while at least half of the classes are, so that a reindex of one class
+/// touches one class; where more have changed it is learnt anew, and all classes are described by it.
+pub(super) fn learn_baselines(
+    request: &Reindex<'_>,
+    describer: &Describer<'_>,
+    current: Option<&Generation>,
+    classes: &[GenerationClass],
+    kept: usize,
+) -> Result<Option<String>, ReindexError> {
+    let store = request.store;
+    let shapes_of = |class: &GenerationClass| -> Result<Vec<Shape>, ReindexError> {
+        let mut shapes = match store.list_shapes(class.class, None, usize::MAX) {
+            // Deleted while it was learnt.
+            Err(StoreError::NoClass { .. }) => Vec::new(),
+            other => other?,
+        };
+        shapes.sort_by_cached_key(Shape::identity);
+        Ok(shapes)
+    };
+    request.progress.begin("learn baselines", classes.len());
+    let before = current
+        .and_then(|g| g.baselines.as_ref())
+        .filter(|_| 2 * kept >= classes.len());
+    let known = match before {
+        // One that cannot be read is learnt anew.
+        Some(key) => store
+            .baseline_model(key)
+            .unwrap_or_default()
+            .map(|m| (key.clone(), m)),
+        None => None,
+    };
+    let (key, model) = match known {
+        Some(known) => known,
+        None => {
+            let mut all = Vec::new();
+            for class in classes {
+                all.extend(shapes_of(class)?);
+            }
+            let Some(model) = learn_model(request, describer, &all)? else {
+                return Ok(None);
+            };
+            (store.put_baseline_model(&model)?, model)
+        }
+    };
+    classes.par_iter().with_max_len(1).try_for_each(|class| {
+        stop_if_cancelled(request)?;
+        let there = matches!(store.baseline_shapes(class, &key), Ok(Some(_)));
+        if !there {
+            let described = shapes_of(class)?
+                .iter()
+                .filter_map(|shape| {
+                    let description = describer.description(shape).ok()?;
+                    model.describe(shape.id.to_string(), &description)
+                })
+                .collect();
+            stop_if_cancelled(request)?;
+            store.put_baseline_shapes(class, &key, described)?;
+        }
+        request.progress.advance();
+        Ok::<(), ReindexError>(())
+    })?;
+    Ok(Some(key))
+}
+
+/// Range and words of shapes evenly spread over the given ones.
+fn learn_model(
+    request: &Reindex<'_>,
+    describer: &Describer<'_>,
+    shapes: &[Shape],
+) -> Result<Option<BaselineModel>, ReindexError> {
+    let taken = shapes.len().min(LEARNT_FROM);
+    let training: Vec<_> = (0..taken)
+        .into_par_iter()
+        .filter_map(|i| thinned(&describer.description(&shapes[i * shapes.len() / taken]).ok()?))
+        .collect();
+    stop_if_cancelled(request)?;
+    if training.is_empty() {
+        return Ok(None);
+    }
+    Ok(Some(BaselineModel::learn(&training, describer.parameters.seed)))
+}
