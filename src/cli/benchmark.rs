@@ -5,19 +5,23 @@ use super::benchmark_cache::{Cache, Key};
 use super::benchmark_nulls::{self, Null};
 use super::peak_memory::{peak_bytes, reset_peak};
 use super::progress::Progress;
-use super::{CliError, benchmark_report, output};
+use super::{CliError, benchmark_report, figures, output};
 use crate::benchmark::evaluate::Models;
 use crate::benchmark::report::{BenchmarkReport, Cost, NullInfo};
 use crate::benchmark::{
     Category, Member, Method, Outcome, Robustness, Setting, Shapes, Specimen, null_models, run_unit,
 };
 use crate::cancel::Cancel;
+use crate::figure::{benchmark_figures, deformation_gallery};
 use crate::mesh::TriangleSoup;
 use crate::parameters::Parameters;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::Path;
 use std::time::Instant;
+
+/// Strength of the deformations in the gallery: strong enough to be seen, weak enough to recognise the shape.
+const GALLERY_STRENGTH: usize = 4;
 
 /// A deformed shape.
 struct Deformed {
@@ -89,8 +93,13 @@ pub fn run(args: &BenchmarkArgs, json: bool) -> Result<(), CliError> {
 }
 
 /// Everything that `--out` asks for. Figures are drawn here too, from the report and the null shapes.
-fn write_files(dir: &Path, report: &BenchmarkReport, _nulls: &[Null]) -> Result<(), CliError> {
-    benchmark_report::write(dir, report)
+fn write_files(dir: &Path, report: &BenchmarkReport, nulls: &[Null]) -> Result<(), CliError> {
+    benchmark_report::write(dir, report)?;
+    let shapes: Vec<(&str, &TriangleSoup)> = nulls.iter().map(|n| (n.class.as_str(), &n.soup)).collect();
+    let deform = |at: usize, kind| nulls[at].member(Category::Deformed(kind), GALLERY_STRENGTH, report.seed);
+    let mut sheets = vec![deformation_gallery(&shapes, GALLERY_STRENGTH as u32, &deform)?];
+    sheets.extend(benchmark_figures(report)?);
+    figures::write(dir, &sheets)
 }
 
 fn info(null: &Null) -> NullInfo {
