@@ -90,8 +90,6 @@ fn everything_acknowledged_survives_every_kill() {
         );
         std::panic::resume_unwind(panic);
     }
-    let log = std::fs::read_to_string(path.join("log")).unwrap();
-    assert!(!log.contains("panicked"), "{log}");
     let acknowledged: u64 = workers.iter().map(|w| w.acknowledged).sum();
     println!(
         "survived {} of {kills} kills in {:.0} s: {acknowledged} changes and {} jobs and snapshots acknowledged; {tally:?}",
@@ -99,7 +97,18 @@ fn everything_acknowledged_survives_every_kill() {
         began.elapsed().as_secs_f64(),
         seen.acknowledged,
     );
+    // The engine panics over records damaged on purpose, which is caught and recovered from; nothing of ours may.
+    let log = std::fs::read_to_string(path.join("log")).unwrap();
+    let ours: Vec<&str> = log
+        .lines()
+        .filter(|line| line.contains("panicked at") && !line.contains("/sled-"))
+        .collect();
+    assert!(ours.is_empty(), "{ours:#?}");
     assert!(acknowledged >= kills, "hardly anything was acknowledged");
+    assert!(
+        seen.acknowledged >= kills / 3,
+        "hardly a job or snapshot was acknowledged"
+    );
 }
 
 /// Everything acknowledged is there.
@@ -217,12 +226,23 @@ fn work_and_kill(service: Service, workers: &mut [Worker], seen: &mut Seen, afte
                 std::thread::sleep(Duration::from_millis(40));
             }
         });
+        // Counted from the first snapshot on, so that a busy machine is killed at work too and not before it; that
+        // one itself is interrupted in every fourth round.
+        let began = Instant::now();
+        while !after.as_millis().is_multiple_of(4)
+            && made.load(Ordering::Relaxed) == 0
+            && began.elapsed() < Duration::from_secs(5)
+        {
+            std::thread::sleep(Duration::from_millis(1));
+        }
         std::thread::sleep(after);
         service.kill();
         ended.store(true, Ordering::Relaxed);
     });
-    seen.jobs
-        .extend(jobs.into_inner().unwrap().into_iter().map(|id| (id, None)));
+    seen.snapshots = snapshots.into_inner().unwrap();
+    let jobs = jobs.into_inner().unwrap();
+    seen.acknowledged += jobs.len() as u64 + made.into_inner();
+    seen.jobs.extend(jobs.into_iter().map(|id| (id, None)));
     // Long lists of jobs would only slow the checks down; the latest are those a crash can touch.
     while seen.jobs.len() > 40 {
         seen.jobs.pop_first();
