@@ -3,7 +3,6 @@
 use axum::body::Body;
 use axum::extract::{FromRequest, FromRequestParts};
 use axum::http::{Request, Uri};
-use futures_util::FutureExt;
 use shapelex::http::dto::PageQuery;
 use shapelex::http::dto::class::{CreateClass, RenameClass};
 use shapelex::http::dto::job::StartReindex;
@@ -12,6 +11,15 @@ use shapelex::http::dto::shape::UploadQuery;
 use shapelex::http::extract::{ApiJson, ApiQuery, OptionalJson};
 use shapelex::model::{ClassId, ClassName};
 use shapelex::parameters::Parameters;
+use tokio::runtime::{Builder, Runtime};
+
+thread_local! {
+    /// Bodies have a time limit, which needs a clock.
+    static RUNTIME: Runtime = Builder::new_current_thread()
+        .enable_time()
+        .build()
+        .expect("a runtime without threads or sockets");
+}
 
 /// Parses; what is accepted is valid where its type says so.
 pub fn check(bytes: &[u8]) {
@@ -67,7 +75,7 @@ fn serde_json_round_trip(parameters: &Parameters) -> Parameters {
 fn query<T: serde::de::DeserializeOwned>(bytes: &[u8]) -> Option<T> {
     let uri = Uri::try_from([b"/v1/query?".as_slice(), bytes].concat()).ok()?;
     let (mut parts, ()) = Request::get(uri).body(()).ok()?.into_parts();
-    let found = ApiQuery::<T>::from_request_parts(&mut parts, &()).now_or_never()?;
+    let found = RUNTIME.with(|runtime| runtime.block_on(ApiQuery::<T>::from_request_parts(&mut parts, &())));
     found.ok().map(|ApiQuery(value)| value)
 }
 
@@ -76,5 +84,5 @@ fn json<T: FromRequest<()>>(bytes: &[u8]) -> Option<T> {
         .header("content-type", "application/json")
         .body(Body::from(bytes.to_vec()))
         .ok()?;
-    T::from_request(request, &()).now_or_never()?.ok()
+    RUNTIME.with(|runtime| runtime.block_on(T::from_request(request, &())).ok())
 }

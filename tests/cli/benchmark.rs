@@ -84,6 +84,15 @@ fn a_small_benchmark_counts_as_its_protocols_say_and_resumes_from_its_cache() {
     // In, hold and null of two categories, and the two of the similarity protocol, by four methods.
     assert_eq!(report["dissimilarity"].as_array().unwrap().len(), (3 * 2 + 2) * 4);
     assert!(read("benchmark.md").contains("| robust |"));
+    for (name, said) in [
+        ("gallery.svg", "shot noise"),
+        ("dissimilarity.svg", "mean score"),
+        ("mds.svg", "first axis"),
+        ("precision_recall.svg", "recall"),
+    ] {
+        let svg = read(name);
+        assert!(svg.starts_with("<svg") && svg.contains(said), "{name}");
+    }
     // A line per count, and the header.
     assert_eq!(read("counts.csv").lines().count(), 1 + 5 * 4 * 3);
 

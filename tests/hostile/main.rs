@@ -75,9 +75,17 @@ async fn each_is_answered_with_its_problem() {
         assert!(began.elapsed() < LIMIT, "{name}: {:?}", began.elapsed());
     }
 
+    // Followed to its end, where a single triangle has no spectrum to speak of.
+    let began = Instant::now();
+    let answer = app
+        .post("/v1/query", "application/octet-stream", surfaces::chain())
+        .await;
+    answer.fails(422, "spectrum_failed");
+    assert!(began.elapsed() < LIMIT, "a chain of nodes: {:?}", began.elapsed());
+
     let nested = format!("{{\"name\": {}{}}}", "[".repeat(100_000), "]".repeat(100_000));
     let answer = app.post("/v1/classes", "application/json", nested).await;
-    answer.fails(400, "invalid_json");
+    answer.fails(422, "invalid_field");
 
     many_equal_pieces(&app).await;
 }

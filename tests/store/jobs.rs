@@ -163,6 +163,7 @@ fn an_index_lives_through_changes_of_its_classes() {
         [
             ("describe shapes", 6, 6),
             ("learn classes", 2, 2),
+            ("learn baselines", 2, 2),
             ("switch", 1, 1)
         ]
     );
