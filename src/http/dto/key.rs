@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 /// What a key allows. Each scope includes the ones before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum ScopeDto {
+pub enum KeyScope {
     /// Querying, listing, showing, downloading, metrics.
     Read,
     /// Classes, shapes, reindexing, cancelling jobs.
@@ -19,7 +19,7 @@ pub enum ScopeDto {
     Admin,
 }
 
-impl From<Scope> for ScopeDto {
+impl From<Scope> for KeyScope {
     fn from(scope: Scope) -> Self {
         match scope {
             Scope::Read => Self::Read,
@@ -29,12 +29,12 @@ impl From<Scope> for ScopeDto {
     }
 }
 
-impl From<ScopeDto> for Scope {
-    fn from(scope: ScopeDto) -> Self {
+impl From<KeyScope> for Scope {
+    fn from(scope: KeyScope) -> Self {
         match scope {
-            ScopeDto::Read => Self::Read,
-            ScopeDto::Write => Self::Write,
-            ScopeDto::Admin => Self::Admin,
+            KeyScope::Read => Self::Read,
+            KeyScope::Write => Self::Write,
+            KeyScope::Admin => Self::Admin,
         }
     }
 }
@@ -48,7 +48,7 @@ pub struct CreateKey {
     #[schema(min_length = 1, max_length = 64, pattern = "^[A-Za-z0-9._-]+$")]
     pub name: String,
     /// What it allows.
-    pub scope: ScopeDto,
+    pub scope: KeyScope,
     /// When it stops working, RFC 3339; never where it is left out.
     #[schema(format = DateTime)]
     pub expires_at: Option<String>,
@@ -114,7 +114,7 @@ pub struct KeyDto {
     /// Unique.
     pub name: String,
     /// What it allows.
-    pub scope: ScopeDto,
+    pub scope: KeyScope,
     /// RFC 3339, UTC.
     #[schema(format = DateTime)]
     pub created_at: String,

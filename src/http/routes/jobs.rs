@@ -27,7 +27,8 @@ use tokio_stream::wrappers::WatchStream;
 /// Queries go on against the old one meanwhile. The answer is a job to follow.
 #[utoipa::path(
     post, path = "/v1/reindex", tag = "jobs",
-    params(("idempotency-key" = Option<String>, Header, description = "1 to 200 visible characters of the client's \
+    params(("idempotency-key" = Option<String>, Header, min_length = 1, max_length = 200,
+            pattern = "^[!-~]+$", description = "1 to 200 visible characters of the client's \
             choice. The same key with the same body within 24 hours gets the same job")),
     request_body(content = Option<StartReindex>, description = "May be left out"),
     responses((status = 202, description = "The job", body = JobDto, headers(
