@@ -154,6 +154,9 @@ impl Inner {
     /// Remembers that a write failed; from now on all are refused.
     fn fail(&self, error: StoreError) -> StoreError {
         tracing::error!(%error, "a write failed; the store is read-only now");
+        if matches!(error, StoreError::Full { .. }) {
+            recover::release_reserve(&self.path);
+        }
         // Only the first failure is kept.
         self.failure().get_or_insert_with(|| error.clone());
         error

@@ -4,7 +4,9 @@ use super::backend::{Backend, Batch};
 use super::catalogue_log::{self, CatalogueLog, LogScan};
 use super::event::{self, Event, get, put, shapes_of};
 use super::payload::Number;
-use super::{Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, rebuild, snapshot};
+use super::{
+    Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, rebuild, recover, snapshot,
+};
 use crate::model::Class;
 use std::fs::{File, TryLockError};
 use std::path::Path;
@@ -25,8 +27,14 @@ impl Store {
     pub fn open(path: &Path, options: &StoreOptions) -> Result<Self, StoreError> {
         let lock = prepare(path)?;
         let mut recovery = Vec::new();
+        // A disk that is full still opens, if it can: with what the reserve held.
+        recover::release_reserve(path);
         let backend = rebuild::open_records(path, options, &mut recovery)?;
-        finish(path, Arc::new(backend), lock, recovery)
+        let store = finish(path, Arc::new(backend), lock, recovery)?;
+        if let Err(error) = recover::take_reserve(path) {
+            tracing::warn!(%error, "there is no space for the reserve of disk space");
+        }
+        Ok(store)
     }
 
     /// Opens a data directory with records in a backend of the caller's.

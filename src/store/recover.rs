@@ -1,12 +1,34 @@
 //! From read-only back to writable, without opening the store anew.
+//!
+//! A reserve file holds a few megabytes of the disk. It is given up when the disk turns out to be full, since the engine
+//! may have to write in order to read: it finishes the splits of its pages, and closes and opens in good order, only if
+//! there is space. Taking the reserve again is how a store finds out that there is space.
 
 use super::open::settle;
 use super::{Store, StoreError, files, snapshot};
 use std::path::Path;
 use std::sync::PoisonError;
 
-/// Written and removed again to see whether there is space: more than the engine and the log take at once.
-const PROBE_BYTES: usize = 4 << 20;
+const RESERVE: &str = "reserve";
+/// More than the engine and the log take at once.
+const RESERVE_BYTES: usize = 4 << 20;
+
+/// Takes the reserve, where it is not there already.
+pub(super) fn take_reserve(data: &Path) -> Result<(), StoreError> {
+    let path = data.join(RESERVE);
+    if std::fs::metadata(&path).is_ok_and(|file| file.len() == RESERVE_BYTES as u64) {
+        return Ok(());
+    }
+    // Not zeros, which a file system may keep without taking space.
+    files::write_durably(&path, &vec![0x5a; RESERVE_BYTES])
+}
+
+/// Gives the reserve up.
+pub(super) fn release_reserve(data: &Path) {
+    if let Err(error) = files::remove(&data.join(RESERVE)) {
+        tracing::error!(%error, "the reserve of disk space was not given up");
+    }
+}
 
 impl Store {
     /// Makes a store writable again that is read-only because the disk was full: looks whether there is space, lets
@@ -22,7 +44,7 @@ impl Store {
             Err(StoreError::Full { .. }) => {}
             Err(other) => return Err(other),
         }
-        probe(self.path())?;
+        take_reserve(self.path())?;
         let _files = self.inner.files.write().unwrap_or_else(PoisonError::into_inner);
         let mut writer = self.inner.writer();
         // A switch to a snapshot may be what met the full disk.
@@ -36,12 +58,4 @@ impl Store {
         tracing::warn!("there is space again; the store takes writes");
         Ok(())
     }
-}
-
-/// Whether a few megabytes can be written.
-fn probe(data: &Path) -> Result<(), StoreError> {
-    let path = data.join(".writing-probe");
-    let written = files::write_durably(&path, &vec![0x5a; PROBE_BYTES]);
-    files::remove(&path)?;
-    written
 }

@@ -43,6 +43,18 @@ impl SledBackend {
             }),
         }
     }
+
+    /// Like [`with`](Self::with), for reads. The engine finishes what a write left undone when it reads, and after a
+    /// write that met a full disk it repeats that failure on and on; opened anew, it reads.
+    fn read<T>(&self, what: &str, work: impl Fn(&sled::Db) -> sled::Result<T>) -> Result<T, StoreError> {
+        match self.with(what, &work) {
+            Err(StoreError::Full { .. }) => {
+                self.reopen(&mut || Ok(()))?;
+                self.with(what, work)
+            }
+            done => done,
+        }
+    }
 }
 
 fn open(path: &Path, cache_bytes: u64) -> Result<sled::Db, StoreError> {
@@ -138,7 +150,7 @@ fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
 
 impl Backend for SledBackend {
     fn get(&self, key: &[u8]) -> Result<Option<Vec<u8>>, StoreError> {
-        self.with("read a record", |db| db.get(key))
+        self.read("read a record", |db| db.get(key))
             .map(|value| value.map(|v| v.to_vec()))
     }
 
@@ -153,8 +165,8 @@ impl Backend for SledBackend {
         {
             return Ok(Vec::new());
         }
-        self.with("scan records", |db| {
-            db.range((low, high))
+        self.read("scan records", |db| {
+            db.range((low.clone(), high.clone()))
                 .take(limit)
                 .map(|entry| entry.map(|(k, v)| (k.to_vec(), v.to_vec())))
                 .collect()
@@ -179,8 +191,8 @@ impl Backend for SledBackend {
         {
             return Ok(Vec::new());
         }
-        self.with("scan records", |db| {
-            db.range((Bound::Included(prefix.to_vec()), high))
+        self.read("scan records", |db| {
+            db.range((Bound::Included(prefix.to_vec()), high.clone()))
                 .rev()
                 .take(limit)
                 .map(|entry| entry.map(|(k, v)| (k.to_vec(), v.to_vec())))
