@@ -1,8 +1,10 @@
 //! How time and memory grow with the size of things. Prints a line of JSON per point.
 //!
-//! `cargo bench --bench scale -- classes 100 1000 10000`, `-- vertices 1000 100000 1000000`, `-- limits`; without a
-//! subject it does nothing.
+//! `cargo bench --bench scale -- classes 100 1000 10000`, `-- vertices 1000 100000 1000000`, `-- shapes 1 10 100`,
+//! `-- limits`; without a subject it does nothing. `-- plot FILE DIR` draws the lines of a file as curves, those of
+//! `cargo bench --bench load -- --json` too.
 
+mod plot;
 mod zoo;
 
 use faer::linalg::matmul::matmul;
@@ -11,7 +13,7 @@ use serde_json::json;
 use shapelex::cancel::Cancel;
 use shapelex::mesh::{Limits, Source, read};
 use shapelex::parameters::{Parameters, RankBy};
-use shapelex::pipeline::describe_query;
+use shapelex::pipeline::{Description, describe_query, held_out_scores, learn_model};
 use shapelex::ranking::{rank, rank_top};
 use std::error::Error;
 use std::f64::consts::TAU;
@@ -33,6 +35,9 @@ fn main() -> Outcome<()> {
     let Some((subject, sizes)) = words.split_first() else {
         return Ok(());
     };
+    if let ("plot", [lines, directory]) = (subject.as_str(), sizes) {
+        return plot::plot(lines.as_ref(), directory.as_ref());
+    }
     let sizes = sizes
         .iter()
         .map(|size| size.parse())
@@ -40,11 +45,12 @@ fn main() -> Outcome<()> {
     match subject.as_str() {
         "classes" => sizes.into_iter().try_for_each(classes),
         "vertices" => sizes.into_iter().try_for_each(vertices),
+        "shapes" => shapes(&sizes),
         "limits" => {
             limits();
             Ok(())
         }
-        other => Err(format!("{other} is none of classes, vertices, limits").into()),
+        other => Err(format!("{other} is none of classes, vertices, shapes, limits, plot").into()),
     }
 }
 
@@ -74,6 +80,33 @@ fn classes(count: usize) -> Outcome<()> {
             "kilobytes_per_class": memory / count.max(1),
         })
     );
+    Ok(())
+}
+
+/// A class of so many training shapes: describing them, learning, and calibrating its confidence.
+fn shapes(sizes: &[usize]) -> Outcome<()> {
+    let parameters = Parameters::default();
+    let mut described: Vec<Description> = Vec::new();
+    let mut describe_ms = 0.0;
+    for &count in sizes {
+        while described.len() < count {
+            let started = Instant::now();
+            described.push(zoo::training_shape(described.len(), &parameters)?);
+            describe_ms += milliseconds(started);
+        }
+        let shapes: Vec<&Description> = described[..count].iter().collect();
+        let started = Instant::now();
+        black_box(learn_model(&shapes, &parameters, &Cancel::new(), &|_, _| ())?);
+        let learn_ms = milliseconds(started);
+        let started = Instant::now();
+        black_box(held_out_scores(&shapes, &parameters, &Cancel::new())?);
+        println!(
+            "{}",
+            json!({ "shapes": count, "describe_ms": describe_ms / described.len() as f64 * count as f64,
+                "learn_ms": learn_ms, "calibrate_ms": milliseconds(started),
+                "resident_kilobytes": resident_kilobytes() })
+        );
+    }
     Ok(())
 }
 

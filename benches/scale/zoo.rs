@@ -147,6 +147,14 @@ fn learnt(number: usize) -> Result<Mat<f64>, String> {
     Ok(model.dictionaries[&Channel::Plain].atoms().clone())
 }
 
+/// Pose `number` of one creature, described for training.
+pub fn training_shape(number: usize, parameters: &Parameters) -> Outcome<Description> {
+    // Poses are five apart, as `describe` tries the next four where one has no surface.
+    Ok(describe(0, 5 * number, &TRAINING, |soup| {
+        describe_shape(soup, parameters, &Cancel::new(), &|_| ())
+    })?)
+}
+
 fn queried(number: usize) -> Result<Mat<f64>, String> {
     let parameters = parameters();
     let described = describe(number, 50, &QUERY, |soup| {

@@ -5,7 +5,7 @@ use super::evaluate::LabelledShape;
 use crate::cancel::Cancel;
 use crate::parameters::Parameters;
 use crate::pipeline::{Description, PipelineError, held_out_scores, learn_model};
-use crate::ranking::{Calibration, Index, IndexedClass, SIGNIFICANCE, rank};
+use crate::ranking::{Calibration, Index, IndexedClass, rank};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -53,6 +53,26 @@ pub struct OpenSet {
     pub mean_set_size: f64,
     /// Classes left out because they have fewer than three shapes.
     pub left_out: Vec<String>,
+}
+
+impl OpenSet {
+    /// Adds the counts of another split of the same shapes.
+    pub fn add(&mut self, other: &Self) {
+        let sum = |a: &mut Share, b: &Share| {
+            a.count += b.count;
+            a.total += b.total;
+        };
+        let sets = self.mean_set_size * self.covered.total as f64;
+        let other_sets = other.mean_set_size * other.covered.total as f64;
+        sum(&mut self.covered, &other.covered);
+        sum(&mut self.refused_known, &other.refused_known);
+        sum(&mut self.refused_unknown, &other.refused_unknown);
+        for (class, share) in &other.refused_by_class {
+            sum(self.refused_by_class.entry(class.clone()).or_default(), share);
+        }
+        self.mean_set_size = (sets + other_sets) / self.covered.total.max(1) as f64;
+        self.left_out.clone_from(&other.left_out);
+    }
 }
 
 /// Half of every class trains, drawn by the seed, and the other half is queried. Then one class after the other is left
@@ -155,8 +175,8 @@ pub fn evaluate_open_set(
         let verdict = full.judge(ranked.iter().map(|(label, score)| (label.as_str(), *score)));
         let set: Vec<&str> = ranked
             .iter()
-            .zip(&verdict.p_values)
-            .filter(|(_, p)| p.is_none_or(|p| p > SIGNIFICANCE))
+            .zip(verdict.p_values.iter().zip(&verdict.possible))
+            .filter(|(_, (p, possible))| p.is_none() || **possible)
             .map(|((label, _), _)| label.as_str())
             .collect();
         possible += set.len();

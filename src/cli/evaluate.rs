@@ -6,7 +6,7 @@ use super::refused::Refused;
 use super::{CliError, ParameterArgs, evaluation_report, figures, output};
 use crate::benchmark::evaluate::Models;
 use crate::benchmark::retrieval::{RetrievalOutcome, coding_scores, judge_retrieval};
-use crate::benchmark::{Evaluation, LabelledShape, Protocol, evaluate};
+use crate::benchmark::{Evaluation, LabelledShape, OpenSet, Protocol, evaluate, evaluate_open_set};
 use crate::cancel::Cancel;
 use crate::figure::evaluation_figures;
 use crate::mesh::{Limits, MeshError, TriangleSoup, read, read_poses};
@@ -31,6 +31,9 @@ pub enum ProtocolName {
     KFold,
     /// Shape against shape: every shape asks for the others of its class
     Retrieval,
+    /// How often a shape of a class that is not indexed is answered "none of these", and what the possible classes
+    /// promise: half of every class trains, drawn at random
+    OpenSet,
 }
 
 /// Arguments of `evaluate`.
@@ -53,7 +56,7 @@ pub struct EvaluateArgs {
     /// Sample this many poses of every animated glTF; other files count once
     #[arg(long, value_name = "COUNT")]
     pub poses: Option<usize>,
-    /// Independent draws of one-shot
+    /// Independent draws of one-shot and open-set
     #[arg(long, value_name = "COUNT", default_value_t = 5)]
     pub draws: usize,
     /// Folds of k-fold
@@ -90,6 +93,8 @@ pub struct Report {
     pub protocols: Vec<Outcome>,
     /// Shape against shape, where it was asked for: a dictionary per shape, nearest neighbour, tiers, DCG, mAP.
     pub retrieval: Option<RetrievalOutcome>,
+    /// What comes of shapes of no indexed class, where it was asked for and enough shapes train: the sum over the draws.
+    pub open_set: Option<OpenSet>,
     /// Wall-clock time of the whole, in seconds.
     pub seconds: f64,
 }
@@ -143,9 +148,13 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
     }
     let mut protocols = Vec::new();
     let mut retrieval = None;
+    let mut open = None;
     for &name in &args.protocol {
         let Some(protocol) = protocol(name, args) else {
-            retrieval = Some(retrieve(&shapes, &parameters, &same)?);
+            match name {
+                ProtocolName::OpenSet => open = open_set(&shapes, &parameters, &same, args)?,
+                _ => retrieval = Some(retrieve(&shapes, &parameters, &same)?),
+            }
             continue;
         };
         let progress = Progress::new(protocol.name(), 0);
@@ -176,6 +185,7 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
         parameters,
         protocols,
         retrieval,
+        open_set: open,
         seconds: began.elapsed().as_secs_f64(),
     };
     if json {
@@ -190,7 +200,7 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
     }
 }
 
-/// The split of a protocol; none for shape against shape, which has no classes to train.
+/// The split of a protocol; none for those that are not about one right class per query.
 fn protocol(name: ProtocolName, args: &EvaluateArgs) -> Option<Protocol> {
     let seed = args.split_seed;
     match name {
@@ -204,7 +214,7 @@ fn protocol(name: ProtocolName, args: &EvaluateArgs) -> Option<Protocol> {
             folds: args.folds,
             seed,
         }),
-        ProtocolName::Retrieval => None,
+        ProtocolName::Retrieval | ProtocolName::OpenSet => None,
     }
 }
 
@@ -225,6 +235,28 @@ fn retrieve(
     progress.finish();
     let classes: Vec<&str> = shapes.iter().map(|s| s.class.as_str()).collect();
     Ok(judge_retrieval(&scores, &classes, same))
+}
+
+/// As many splits as there are draws, summed. `None` where too few shapes train to calibrate anything.
+fn open_set(
+    shapes: &[LabelledShape],
+    parameters: &Parameters,
+    same: &[Vec<String>],
+    args: &EvaluateArgs,
+) -> Result<Option<OpenSet>, CliError> {
+    let mut sum: Option<OpenSet> = None;
+    for draw in 0..args.draws as u64 {
+        let progress = Progress::new("open set", 0);
+        let seed = args.split_seed.wrapping_add(draw);
+        let split = evaluate_open_set(shapes, parameters, same, seed, &Cancel::new(), &|done, total| {
+            progress.set(done, total);
+        })?;
+        progress.finish();
+        if let Some(split) = split {
+            sum.get_or_insert_default().add(&split);
+        }
+    }
+    Ok(sum)
 }
 
 /// Describes every file on all cores. Files that cannot be used come back with their reason.

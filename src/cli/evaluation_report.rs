@@ -3,6 +3,7 @@
 use super::evaluate::{Outcome, Report};
 use super::output::table;
 use crate::benchmark::retrieval::RetrievalOutcome;
+use crate::benchmark::{OpenSet, Share};
 
 /// Confusion matrices with more classes than this do not fit a screen; they are listed instead.
 const MATRIX_CLASSES: usize = 26;
@@ -29,6 +30,7 @@ pub fn text(report: &Report) -> String {
         parts.push(summary(report));
     }
     parts.extend(report.retrieval.as_ref().map(retrieval));
+    parts.extend(report.open_set.as_ref().map(open_set));
     parts.join("\n")
 }
 
@@ -54,6 +56,36 @@ fn retrieval(outcome: &RetrievalOutcome) -> String {
         ">mAP",
     ];
     format!("\nretrieval, shape against shape\n{}", table(&header, &[row]))
+}
+
+fn open_set(outcome: &OpenSet) -> String {
+    let row = |what: &str, share: &Share| {
+        vec![
+            what.to_owned(),
+            share.count.to_string(),
+            share.total.to_string(),
+            format!("{:.1} %", 100.0 * share.value()),
+        ]
+    };
+    let mut rows = vec![
+        row("the possible classes hold the true one", &outcome.covered),
+        row(
+            "of an indexed class, answered none of these",
+            &outcome.refused_known,
+        ),
+        row(
+            "of a class left out, answered none of these",
+            &outcome.refused_unknown,
+        ),
+    ];
+    for (class, share) in &outcome.refused_by_class {
+        rows.push(row(&format!("    {class}"), share));
+    }
+    format!(
+        "\nopen set, {:.2} possible classes on average\n{}",
+        outcome.mean_set_size,
+        table(&["", ">shapes", ">of", ">"], &rows)
+    )
 }
 
 fn summary(report: &Report) -> String {

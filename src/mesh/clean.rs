@@ -59,7 +59,9 @@ pub(super) fn clean(
     report.welded_vertices = referenced - vertices.len();
 
     let areas = filter_faces(&vertices, &mut faces, report)?;
-    drop_unreferenced(&mut vertices, &mut faces);
+    if report.degenerate_faces + report.duplicate_faces > 0 {
+        drop_unreferenced(&mut vertices, &mut faces);
+    }
     report.unreferenced_vertices = report.input_vertices - report.welded_vertices - vertices.len();
 
     let Selection {
@@ -72,7 +74,9 @@ pub(super) fn clean(
     report.components = found;
     report.components_dropped = dropped;
     report.area_dropped = area_dropped;
-    drop_unreferenced(&mut vertices, &mut faces);
+    if dropped > 0 {
+        drop_unreferenced(&mut vertices, &mut faces);
+    }
     Ok(Cleaned {
         vertices,
         faces,
@@ -161,14 +165,12 @@ fn proper_area(vertices: &[[f64; 3]], f: &[u32; 3]) -> f64 {
         return 0.0;
     }
     let area = face_area(vertices, f);
-    let longest = (0..3)
-        .map(|k| super::boundary::distance(&vertices[f[k] as usize], &vertices[f[(k + 1) % 3] as usize]))
-        .fold(0.0, f64::max);
-    if area > COLLINEAR * longest * longest {
-        area
-    } else {
-        0.0
-    }
+    let square = |a: u32, b: u32| {
+        let (a, b) = (&vertices[a as usize], &vertices[b as usize]);
+        (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum::<f64>()
+    };
+    let longest = square(f[0], f[1]).max(square(f[1], f[2])).max(square(f[2], f[0]));
+    if area > COLLINEAR * longest { area } else { 0.0 }
 }
 
 fn retain(
@@ -190,8 +192,8 @@ fn retain(
 
 /// Flags every face whose three vertices an earlier face has already, in any order.
 fn duplicates(vertex_count: usize, faces: &[[u32; 3]]) -> Vec<bool> {
-    // Buckets by smallest vertex, each sorted by the other two: linear for bounded degree.
-    let mut start = vec![0usize; vertex_count + 1];
+    // Buckets by smallest vertex, in the order of the faces; each is compared by the other two.
+    let mut start = vec![0u32; vertex_count + 1];
     let smallest = |f: &[u32; 3]| f[0].min(f[1]).min(f[2]) as usize;
     for f in faces {
         start[smallest(f) + 1] += 1;
@@ -200,19 +202,27 @@ fn duplicates(vertex_count: usize, faces: &[[u32; 3]]) -> Vec<bool> {
         start[v + 1] += start[v];
     }
     let mut next = start.clone();
-    let mut entries = vec![(0u64, 0u32); faces.len()];
+    let mut bucketed = vec![0u32; faces.len()];
     for (i, f) in faces.iter().enumerate() {
-        let mut sorted = *f;
-        sorted.sort_unstable();
         let slot = &mut next[smallest(f)];
-        entries[*slot] = (u64::from(sorted[1]) << 32 | u64::from(sorted[2]), i as u32);
+        bucketed[*slot as usize] = i as u32;
         *slot += 1;
     }
     let mut duplicate = vec![false; faces.len()];
+    let mut entries: Vec<(u64, u32)> = Vec::new();
     for v in 0..vertex_count {
-        let bucket = &mut entries[start[v]..start[v + 1]];
-        bucket.sort_unstable();
-        for pair in bucket.windows(2) {
+        let bucket = &bucketed[start[v] as usize..start[v + 1] as usize];
+        if bucket.len() < 2 {
+            continue;
+        }
+        entries.clear();
+        entries.extend(bucket.iter().map(|&i| {
+            let mut sorted = faces[i as usize];
+            sorted.sort_unstable();
+            (u64::from(sorted[1]) << 32 | u64::from(sorted[2]), i)
+        }));
+        entries.sort_unstable();
+        for pair in entries.windows(2) {
             if pair[0].0 == pair[1].0 {
                 duplicate[pair[1].1 as usize] = true;
             }

@@ -71,37 +71,30 @@ pub(super) fn select(
         sets.union(f[0], f[2]);
     }
     let mut number = vec![u32::MAX; vertices.len()];
-    let mut component: Vec<(f64, [f64; 3])> = Vec::new(); // area, smallest vertex
+    let mut component: Vec<f64> = Vec::new(); // areas
     let mut of_face = Vec::with_capacity(faces.len());
     for (f, area) in faces.iter().zip(areas) {
         let slot = &mut number[sets.find(f[0]) as usize];
         if *slot == u32::MAX {
             *slot = component.len() as u32;
-            component.push((0.0, vertices[f[0] as usize]));
+            component.push(0.0);
         }
-        let entry = &mut component[*slot as usize];
-        entry.0 += area;
-        for &v in f {
-            if vertices[v as usize] < entry.1 {
-                entry.1 = vertices[v as usize];
-            }
-        }
+        component[*slot as usize] += area;
         of_face.push(*slot);
     }
-    let total: f64 = component.iter().map(|c| c.0).sum();
-    let largest_area = component.iter().map(|c| c.0).fold(0.0, f64::max);
-    let largest = component
-        .iter()
-        .enumerate()
-        .filter(|(_, c)| c.0 >= largest_area * (1.0 - AREA_TIE))
-        .min_by(|x, y| x.1.1.partial_cmp(&y.1.1).unwrap_or(std::cmp::Ordering::Equal))
-        .map_or(0, |(i, _)| i);
+    let total: f64 = component.iter().sum();
+    let largest = largest(vertices, &faces, &of_face, &component);
     let kept: Vec<bool> = component
         .iter()
         .enumerate()
-        .map(|(i, c)| i == largest || (keep == Components::All && c.0 >= SMALLEST_SHARE * total))
+        .map(|(i, area)| i == largest || (keep == Components::All && *area >= SMALLEST_SHARE * total))
         .collect();
-    let area_kept: f64 = (component.iter().zip(&kept).filter(|(_, k)| **k).map(|(c, _)| c.0)).sum();
+    let area_kept: f64 = (component
+        .iter()
+        .zip(&kept)
+        .filter(|(_, k)| **k)
+        .map(|(area, _)| area))
+    .sum();
     let dropped = kept.iter().filter(|k| !**k).count();
     Selection {
         faces: if dropped == 0 {
@@ -122,6 +115,26 @@ pub(super) fn select(
             (1.0 - area_kept / total).clamp(0.0, 1.0)
         },
     }
+}
+
+/// The component of the largest area; of several, the one with the smallest vertex.
+fn largest(vertices: &[[f64; 3]], faces: &[[u32; 3]], of_face: &[u32], areas: &[f64]) -> usize {
+    let most = areas.iter().copied().fold(0.0, f64::max);
+    let tied = |c: usize| areas[c] >= most * (1.0 - AREA_TIE);
+    let mut candidates = (0..areas.len()).filter(|&c| tied(c));
+    let first = candidates.next().unwrap_or(0);
+    if candidates.next().is_none() {
+        return first;
+    }
+    let mut best = (first, [f64::INFINITY; 3]);
+    for (f, &c) in faces.iter().zip(of_face).filter(|(_, c)| tied(**c as usize)) {
+        for &v in f {
+            if vertices[v as usize] < best.1 {
+                best = (c as usize, vertices[v as usize]);
+            }
+        }
+    }
+    best.0
 }
 
 #[cfg(test)]

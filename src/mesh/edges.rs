@@ -15,15 +15,17 @@ pub struct EdgeCensus {
 ///
 /// An entry of `group` is a half-edge `3 · face + corner` that runs from the corner to the next one, shifted left by
 /// one; the low bit is set where it runs from the larger to the smaller index. Within a group entries ascend by face.
+/// There are at most 2³² / 6 faces, far above what any reader takes.
 ///
 /// Half-edges are bucketed by the smaller index and each bucket is sorted, so the cost is linear for bounded degree
 /// and n log n at worst.
 pub(super) fn for_each_edge(
     vertex_count: usize,
     faces: &[[u32; 3]],
-    mut visit: impl FnMut(u32, u32, &[u64]),
+    mut visit: impl FnMut(u32, u32, &[u32]),
 ) {
-    let mut start = vec![0usize; vertex_count + 1];
+    debug_assert!(faces.len() <= (u32::MAX / 6) as usize);
+    let mut start = vec![0u32; vertex_count + 1];
     for face in faces {
         for k in 0..3 {
             start[face[k].min(face[(k + 1) % 3]) as usize + 1] += 1;
@@ -33,23 +35,26 @@ pub(super) fn for_each_edge(
         start[v + 1] += start[v];
     }
     let mut next = start.clone();
-    let mut entries = vec![(0u32, 0u64); 3 * faces.len()];
+    // The larger index above, the half-edge below: half the memory of a pair, and one comparison.
+    let mut entries = vec![0u64; 3 * faces.len()];
     for (f, face) in faces.iter().enumerate() {
         for k in 0..3 {
             let (a, b) = (face[k], face[(k + 1) % 3]);
             let slot = &mut next[a.min(b) as usize];
-            entries[*slot] = (a.max(b), ((3 * f + k) as u64) << 1 | u64::from(a > b));
+            let half_edge = ((3 * f + k) as u32) << 1 | u32::from(a > b);
+            entries[*slot as usize] = u64::from(a.max(b)) << 32 | u64::from(half_edge);
             *slot += 1;
         }
     }
+    drop(next);
     let mut group = Vec::new();
     for v in 0..vertex_count {
-        let bucket = &mut entries[start[v]..start[v + 1]];
+        let bucket = &mut entries[start[v] as usize..start[v + 1] as usize];
         bucket.sort_unstable();
-        for run in bucket.chunk_by(|x, y| x.0 == y.0) {
+        for run in bucket.chunk_by(|x, y| x >> 32 == y >> 32) {
             group.clear();
-            group.extend(run.iter().map(|e| e.1));
-            visit(v as u32, run[0].0, &group);
+            group.extend(run.iter().map(|e| *e as u32));
+            visit(v as u32, (run[0] >> 32) as u32, &group);
         }
     }
 }

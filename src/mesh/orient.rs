@@ -14,8 +14,8 @@ pub(super) fn orient(vertex_count: usize, faces: &mut [[u32; 3]]) {
     for_each_edge(vertex_count, faces, |_, _, group| {
         if let [x, y] = *group {
             let same = x & 1 == y & 1;
-            across[(x >> 1) as usize] = ((y >> 1) as u32 / 3, same);
-            across[(y >> 1) as usize] = ((x >> 1) as u32 / 3, same);
+            across[(x >> 1) as usize] = ((y >> 1) / 3, same);
+            across[(y >> 1) as usize] = ((x >> 1) / 3, same);
         }
     });
     let mut reversed: Vec<Option<bool>> = vec![None; faces.len()];

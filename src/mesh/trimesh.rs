@@ -14,6 +14,7 @@ pub struct TriMesh {
     vertices: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
     signature_vertices: usize,
+    area: f64,
 }
 
 impl TriMesh {
@@ -56,16 +57,16 @@ impl TriMesh {
                 detail: format!("vertex {v} belongs to no face"),
             });
         }
-        let mesh = Self {
-            vertices,
-            faces,
-            signature_vertices: signature_vertices.min(n),
-        };
-        let area = mesh.area();
+        let area = total_area(&vertices, &faces);
         if !(area > 0.0 && area.is_finite()) {
             return Err(MeshError::Degenerate);
         }
-        Ok(mesh)
+        Ok(Self {
+            vertices,
+            faces,
+            signature_vertices: signature_vertices.min(n),
+            area,
+        })
     }
 
     /// V × 3 coordinates.
@@ -85,7 +86,7 @@ impl TriMesh {
 
     /// Total surface area, in squared units of the coordinates.
     pub fn area(&self) -> f64 {
-        self.faces.iter().map(|f| face_area(&self.vertices, f)).sum()
+        self.area
     }
 
     /// The area centroid μ = Σ_f w_f (a + b + c) / 3, where w_f is a face's share of the area.
@@ -110,13 +111,13 @@ impl TriMesh {
     /// finite.
     pub fn normalised(mut self) -> Result<Self, MeshError> {
         let centroid = self.centroid();
-        let scale = 1.0 / self.area().sqrt();
+        let scale = 1.0 / self.area.sqrt();
         for p in &mut self.vertices {
             for (x, c) in p.iter_mut().zip(centroid) {
                 *x = (*x - c) * scale;
             }
         }
-        let area = self.area();
+        let area = total_area(&self.vertices, &self.faces);
         if !(area > 0.5 && area < 2.0) {
             return Err(MeshError::Degenerate);
         }
@@ -125,6 +126,7 @@ impl TriMesh {
         for x in self.vertices.iter_mut().flatten() {
             *x *= correction;
         }
+        self.area = 1.0;
         Ok(self)
     }
 
@@ -132,6 +134,10 @@ impl TriMesh {
     pub fn into_parts(self) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
         (self.vertices, self.faces)
     }
+}
+
+fn total_area(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> f64 {
+    faces.iter().map(|f| face_area(vertices, f)).sum()
 }
 
 /// Area of one face: half the length of the cross product of two edges.

@@ -23,26 +23,28 @@ pub(super) struct Welded {
 /// along every axis always merge, pairs further apart than twice that never do unless others lie between them. The
 /// merged vertex takes the lexicographically smallest of its members' coordinates.
 ///
-/// One sort of the cells and one sweep over them: n log n whatever the distribution of the points.
+/// Most vertices of most meshes are alone far and wide, which one hash table over coarse cells shows ([`suspects`]).
+/// The others are sorted by cell and swept over: n log n whatever the distribution of the points.
 pub(super) fn weld(vertices: &[[f64; 3]]) -> Welded {
     let (low, diagonal) = bounding_box(vertices);
     let side = WELD_TOLERANCE * diagonal;
     // Cells are numbered from 1, so that the cell before the first has a number too.
-    let cell = |p: &[f64; 3]| {
-        (0..3).fold(0u128, |key, k| {
-            let i = ((p[k] - low[k]) / side) as u64 + 1;
-            key << BITS | u128::from(i.min((1 << BITS) - 2))
+    let cell =
+        |p: &[f64; 3]| std::array::from_fn(|k| (((p[k] - low[k]) / side) as u64 + 1).min((1 << BITS) - 2));
+    let mut order: Vec<u128> = suspects(vertices, cell)
+        .into_iter()
+        .map(|i| {
+            let key = cell(&vertices[i as usize])
+                .iter()
+                .fold(0, |key, c| key << BITS | u128::from(*c));
+            key << 32 | u128::from(i)
         })
-    };
-    let mut order: Vec<u128> = vertices
-        .iter()
-        .enumerate()
-        .map(|(i, p)| cell(p) << 32 | i as u128)
         .collect();
     order.sort_unstable();
 
-    let mut cells: Vec<u128> = Vec::with_capacity(vertices.len());
-    let mut cell_of = vec![0u32; vertices.len()];
+    const ALONE: u32 = u32::MAX;
+    let mut cells: Vec<u128> = Vec::with_capacity(order.len());
+    let mut cell_of = vec![ALONE; vertices.len()];
     for key in order {
         if cells.last() != Some(&(key >> 32)) {
             cells.push(key >> 32);
@@ -54,13 +56,19 @@ pub(super) fn weld(vertices: &[[f64; 3]]) -> Welded {
 
     let mut place = vec![u32::MAX; cells.len()];
     let mut welded = Welded {
-        vertices: Vec::with_capacity(cells.len()),
+        vertices: Vec::with_capacity(vertices.len()),
         index: Vec::with_capacity(vertices.len()),
     };
     for (p, &c) in vertices.iter().zip(&cell_of) {
+        let next = welded.vertices.len() as u32;
+        if c == ALONE {
+            welded.vertices.push(*p);
+            welded.index.push(next);
+            continue;
+        }
         let slot = &mut place[sets.find(c) as usize];
         if *slot == u32::MAX {
-            *slot = welded.vertices.len() as u32;
+            *slot = next;
             welded.vertices.push(*p);
         } else {
             let kept = &mut welded.vertices[*slot as usize];
@@ -71,6 +79,49 @@ pub(super) fn weld(vertices: &[[f64; 3]]) -> Welded {
         welded.index.push(*slot);
     }
     welded
+}
+
+/// The vertices that may have another one in their cell or in a cell that touches it, ascending: those that share a
+/// coarse cell of 2¹⁰ cells a side, and those in the outermost cells of theirs, whose neighbours may lie in the next.
+fn suspects(vertices: &[[f64; 3]], cell: impl Fn(&[f64; 3]) -> [u64; 3]) -> Vec<u32> {
+    const COARSE: u32 = 10;
+    const INNER: u64 = (1 << COARSE) - 1;
+    const FREE: u32 = u32::MAX;
+    /// Longer runs in a table half full are made on purpose; then every vertex is suspect, which the sort can bear.
+    const LONGEST_RUN: usize = 256;
+    let mut suspect = vec![false; vertices.len()];
+    let mut keys = Vec::with_capacity(vertices.len());
+    for (p, suspect) in vertices.iter().zip(&mut suspect) {
+        let cell = cell(p);
+        *suspect = cell.iter().any(|c| matches!(c & INNER, 0 | INNER));
+        keys.push(cell.iter().fold(0, |key, c| key << (BITS - COARSE) | c >> COARSE));
+    }
+    // Open addressing, at most half full.
+    let bits = (2 * vertices.len()).next_power_of_two().trailing_zeros().max(1);
+    let mut table = vec![FREE; 1 << bits];
+    for (i, key) in keys.iter().enumerate() {
+        // Fibonacci hashing: the high bits of a product with 2⁶⁴ / φ are well mixed.
+        let mut slot = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - bits)) as usize;
+        for run in 0.. {
+            if run == LONGEST_RUN {
+                return (0..vertices.len() as u32).collect();
+            }
+            let there = table[slot];
+            if there == FREE {
+                table[slot] = i as u32;
+                break;
+            }
+            if keys[there as usize] == *key {
+                suspect[there as usize] = true;
+                suspect[i] = true;
+                break;
+            }
+            slot = (slot + 1) & ((1 << bits) - 1);
+        }
+    }
+    (0..vertices.len() as u32)
+        .filter(|&i| suspect[i as usize])
+        .collect()
 }
 
 /// Joins cells that touch, corners included. `cells` is sorted.
