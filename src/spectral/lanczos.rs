@@ -7,13 +7,14 @@
 //! for two blocks at once (Grimes, Lewis and Simon 1994).
 
 use super::SpectralError;
-use super::basis::Basis;
+use super::band::Band;
+use super::basis::{Basis, Eight, WIDTH};
 use super::block_qr::{Small, add_product, cholesky_qr, inner, negated, product, transposed};
 use super::dense;
 use super::loss::Loss;
 use super::normalised::NullSpace;
 use super::shift_invert::Factor;
-use super::simd::Simd;
+use super::simd::{Row, Simd};
 use faer::Mat;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -34,17 +35,20 @@ pub struct Lanczos<'a, const B: usize> {
     loss: Loss<B>,
 }
 
-/// Eigenpairs of the projected operator.
+/// Eigenpairs of the projected operator, those asked for.
 pub struct Ritz {
     /// Ritz values of OP, ascending.
     pub theta: Vec<f64>,
-    /// m × m, one eigenvector per column.
+    /// m × k, one eigenvector per column.
     pub vectors: Mat<f64>,
-    /// B × m: R_last times the last B rows of `vectors`; the norm of a column is the residual of OP.
+    /// B × k: R_last times the last B rows of `vectors`; the norm of a column is the residual of OP.
     pub tail: Mat<f64>,
 }
 
-impl<'a, const B: usize> Lanczos<'a, B> {
+impl<'a, const B: usize> Lanczos<'a, B>
+where
+    [f64; B]: Row,
+{
     /// Starts from a random block. `capacity` columns of basis are reserved, a multiple of B.
     pub fn new(
         n: usize,
@@ -136,15 +140,24 @@ impl<'a, const B: usize> Lanczos<'a, B> {
     /// returns the new factor.
     fn reorthogonalise(&mut self, w: &mut [[f64; B]], r: &Small<B>) -> Result<Small<B>, SpectralError> {
         let older = self.basis.columns() - B;
-        let mut pair: Vec<[[f64; B]; 2]> = self.current.iter().zip(w.iter()).map(|(c, w)| [*c, *w]).collect();
-        let found = self.basis.project_out::<B, 2>(self.simd, older, &mut pair);
-        // Beyond this one pass is not enough.
-        if found > 1e-4 {
-            self.basis.project_out::<B, 2>(self.simd, older, &mut pair);
-        }
-        for ((c, w), p) in self.current.iter_mut().zip(w.iter_mut()).zip(&pair) {
-            *c = p[0];
-            *w = p[1];
+        let mut found = 0.0f64;
+        let mut pair = vec![[0.0; WIDTH]; w.len()];
+        // Vectors of both blocks, eight at a time.
+        for first in (0..B).step_by(WIDTH / 2) {
+            for ((p, c), w) in pair.iter_mut().zip(&self.current).zip(w.iter()) {
+                p[..WIDTH / 2].copy_from_slice(&c[first..first + WIDTH / 2]);
+                p[WIDTH / 2..].copy_from_slice(&w[first..first + WIDTH / 2]);
+            }
+            let lost = self.basis.project_out(self.simd, older, &mut pair);
+            // Beyond this one pass is not enough.
+            if lost > 1e-4 {
+                self.basis.project_out(self.simd, older, &mut pair);
+            }
+            found = found.max(lost);
+            for ((p, c), w) in pair.iter().zip(&mut self.current).zip(w.iter_mut()) {
+                c[first..first + WIDTH / 2].copy_from_slice(&p[..WIDTH / 2]);
+                w[first..first + WIDTH / 2].copy_from_slice(&p[WIDTH / 2..]);
+            }
         }
         self.loss.reset_both(self.below.len(), found);
         self.basis.overwrite_last(&self.current);
@@ -161,10 +174,12 @@ impl<'a, const B: usize> Lanczos<'a, B> {
     /// Gram-Schmidt against the whole basis with replacement, for a block that has (nearly) lost rank: columns that
     /// vanish are replaced by random ones with zeros in R.
     fn column_by_column(&mut self, w: &mut [[f64; B]], rounding: f64) -> Result<Small<B>, SpectralError> {
-        let norm = |column: &[[[f64; 1]; 1]]| column.iter().map(|x| x[0][0] * x[0][0]).sum::<f64>().sqrt();
+        let norm = |column: &[Eight]| column.iter().map(|x| x[0] * x[0]).sum::<f64>().sqrt();
         let mut r = [[0.0; B]; B];
         for c in 0..B {
-            let mut column: Vec<[[f64; 1]; 1]> = w.iter().map(|row| [[row[c]]]).collect();
+            // One vector; the other places of its rows stay zero.
+            let alone = |x: f64| std::array::from_fn(|k| if k == 0 { x } else { 0.0 });
+            let mut column: Vec<Eight> = w.iter().map(|row| alone(row[c])).collect();
             let mut replaced = 0;
             loop {
                 let before = norm(&column);
@@ -175,18 +190,18 @@ impl<'a, const B: usize> Lanczos<'a, B> {
                             detail: "the Krylov basis cannot be extended".into(),
                         });
                     }
-                    let mut fresh: Vec<[f64; 1]> =
-                        column.iter().map(|_| [self.rng.random::<f64>() - 0.5]).collect();
-                    remove_null_space(self.null, &mut fresh);
-                    column = fresh.into_iter().map(|x| [x]).collect();
+                    for x in &mut column {
+                        x[0] = self.rng.random::<f64>() - 0.5;
+                    }
+                    remove_null_space(self.null, &mut column);
                     continue;
                 }
                 self.basis
-                    .project_out::<1, 1>(self.simd, self.basis.columns(), &mut column);
+                    .project_out(self.simd, self.basis.columns(), &mut column);
                 for k in 0..c {
-                    let h: f64 = column.iter().zip(w.iter()).map(|(x, row)| x[0][0] * row[k]).sum();
+                    let h: f64 = column.iter().zip(w.iter()).map(|(x, row)| x[0] * row[k]).sum();
                     for (x, row) in column.iter_mut().zip(w.iter()) {
-                        x[0][0] -= h * row[k];
+                        x[0] -= h * row[k];
                     }
                     if replaced == 0 {
                         r[k][c] += h;
@@ -200,31 +215,46 @@ impl<'a, const B: usize> Lanczos<'a, B> {
             let length = norm(&column);
             r[c][c] = if replaced > 0 { 0.0 } else { length };
             for (x, row) in column.iter().zip(w.iter_mut()) {
-                row[c] = x[0][0] / length;
+                row[c] = x[0] / length;
             }
         }
         Ok(r)
     }
 
-    /// The eigenpairs of the projection.
-    pub fn ritz(&self) -> Result<Ritz, SpectralError> {
-        let m = self.dimension();
-        let mut t = Mat::<f64>::zeros(m, m);
-        for (j, (a, r)) in self.diagonal.iter().zip(&self.below).enumerate() {
-            for i in 0..B {
-                for k in 0..B {
-                    t[(j * B + i, j * B + k)] = a[i][k];
-                    if (j + 1) * B < m {
-                        t[((j + 1) * B + i, j * B + k)] = r[i][k];
-                        t[(j * B + k, (j + 1) * B + i)] = r[i][k];
-                    }
-                }
+    /// The projection, a band: R is upper triangular.
+    fn projection(&self) -> Band<B> {
+        Band::new(self.dimension(), |i, j| {
+            let (block, column) = (j / B, j % B);
+            match i / B == block {
+                true => self.diagonal[block][i % B][column],
+                false => self.below[block][i % B][column],
             }
+        })
+    }
+
+    /// Eigenvalues of the projection, ascending.
+    pub fn ritz_values(&self) -> Result<Vec<f64>, SpectralError> {
+        match self.projection().eigenvalues() {
+            Some(theta) => Ok(theta),
+            None => Ok(dense::symmetric_eigen(self.projection().to_dense().as_ref())?.0),
         }
-        let (theta, vectors) = dense::symmetric_eigen(t.as_ref())?;
+    }
+
+    /// Eigenpairs of the projection: those at places `which` (ascending) of [`Lanczos::ritz_values`], `theta`.
+    pub fn ritz(&self, theta: &[f64], which: &[usize]) -> Result<Ritz, SpectralError> {
+        let projection = self.projection();
+        let chosen: Vec<f64> = which.iter().map(|&i| theta[i]).collect();
+        let (theta, vectors) = match projection.eigenvectors(&chosen) {
+            Some(vectors) => (chosen, vectors),
+            None => {
+                let (all, vectors) = dense::symmetric_eigen(projection.to_dense().as_ref())?;
+                let vectors = Mat::from_fn(vectors.nrows(), which.len(), |i, k| vectors[(i, which[k])]);
+                (which.iter().map(|&i| all[i]).collect(), vectors)
+            }
+        };
         let last = self.below.last().map_or([[0.0; B]; B], |r| *r);
         let last = Mat::<f64>::from_fn(B, B, |i, j| last[i][j]);
-        let tail = &last * vectors.as_ref().submatrix(m - B, 0, B, m);
+        let tail = &last * vectors.as_ref().subrows(vectors.nrows() - B, B);
         Ok(Ritz { theta, vectors, tail })
     }
 

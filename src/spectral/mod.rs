@@ -6,9 +6,11 @@ pub mod error;
 pub mod laplacian;
 pub mod mollify;
 
+mod band;
 mod basis;
 mod block_qr;
 mod dense;
+mod inverse_iteration;
 mod lanczos;
 mod loss;
 mod normalised;

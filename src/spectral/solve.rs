@@ -10,6 +10,7 @@ use super::normalised::Normalised;
 use super::parts::smallest_by_parts;
 use super::residual::{self, Check};
 use super::shift_invert::{Analysis, Factor};
+use super::simd::Row;
 use super::{EigenOptions, SpectralError};
 use crate::cancel::Cancel;
 use rand::SeedableRng;
@@ -36,6 +37,9 @@ pub const ZERO: f64 = 1e-9;
 
 /// Accepted ‖XᵀX − I‖_F. Re-orthogonalisation keeps it near 1e-9; what it can cost the tolerance is its own size.
 const ORTHOGONALITY: f64 = 1e-7;
+
+/// Pairs beyond the wanted ones that are looked at, for a gap to count eigenvalues in.
+const BEYOND: usize = 8;
 
 /// Block sizes in the order they are tried. Small blocks need the smallest subspace; a block finds at most its own size
 /// of copies of an eigenvalue in exact arithmetic, so larger ones follow when the count does not come out.
@@ -247,6 +251,19 @@ fn choose_shift(
         })
 }
 
+/// Places of the few wanted pairs that converge last: those farthest from the shift, at both ends; ascending.
+fn outermost(places: &[usize], wanted: usize) -> Vec<usize> {
+    let (low, high) = (2.min(wanted), 6.min(wanted));
+    let mut ends: Vec<usize> = places[..low]
+        .iter()
+        .chain(&places[wanted - high..wanted])
+        .copied()
+        .collect();
+    ends.sort_unstable();
+    ends.dedup();
+    ends
+}
+
 struct Problem<'a> {
     s: &'a Normalised,
     analysis: &'a Analysis,
@@ -259,10 +276,14 @@ struct Problem<'a> {
 
 impl Problem<'_> {
     /// Runs the recurrence until the wanted pairs have converged, then checks them and their number.
-    fn attempt<const B: usize>(&self) -> Result<Pairs, SpectralError> {
+    fn attempt<const B: usize>(&self) -> Result<Pairs, SpectralError>
+    where
+        [f64; B]: Row,
+    {
         let available = (self.s.n - self.s.null.count) / B * B;
         let first = first_subspace(self.wanted, B).min(available - B);
         let capacity = (2 * first).min(available);
+        let accepted = 0.3 * self.options.tolerance;
         let rng = ChaCha8Rng::seed_from_u64(self.options.seed);
         let mut lanczos = Lanczos::<B>::new(self.s.n, self.factor, &self.s.null, capacity, rng)?;
         let mut next_look = first;
@@ -274,20 +295,37 @@ impl Problem<'_> {
                 continue;
             }
             self.cancel.check()?;
-            let ritz = lanczos.ritz()?;
-            let (chosen, worst) = self.choose(&ritz);
-            if worst <= 0.3 * self.options.tolerance {
+            let theta = lanczos.ritz_values()?;
+            let places = self.by_value(&theta);
+            let mut worst = f64::INFINITY;
+            if places.len() > self.wanted {
+                let ritz = lanczos.ritz(&theta, &outermost(&places, self.wanted))?;
+                worst = self.worst(
+                    &ritz,
+                    0..ritz.theta.len(),
+                    self.value(theta[places[self.wanted - 1]]),
+                );
+            }
+            if worst <= accepted {
                 self.cancel.check()?;
-                let values = chosen[..self.wanted]
-                    .iter()
-                    .map(|&i| self.value(&ritz, i))
-                    .collect();
-                let vectors = lanczos.vectors(&ritz, &chosen[..self.wanted]);
-                drop(lanczos);
-                let pairs = accept(self.s, (values, vectors), self.options.tolerance)?;
-                self.cancel.check()?;
-                self.certify(&ritz, &chosen)?;
-                return Ok(pairs);
+                let mut which = places[..places.len().min(self.wanted + BEYOND)].to_vec();
+                which.sort_unstable();
+                let ritz = lanczos.ritz(&theta, &which)?;
+                let chosen = self.by_value(&ritz.theta);
+                let last = self.value(ritz.theta[chosen[self.wanted - 1]]);
+                worst = self.worst(&ritz, chosen[..self.wanted].iter().copied(), last);
+                if worst <= accepted {
+                    let values = chosen[..self.wanted]
+                        .iter()
+                        .map(|&i| self.value(ritz.theta[i]))
+                        .collect();
+                    let vectors = lanczos.vectors(&ritz, &chosen[..self.wanted]);
+                    drop(lanczos);
+                    let pairs = accept(self.s, (values, vectors), self.options.tolerance)?;
+                    self.cancel.check()?;
+                    self.certify(&ritz, &chosen)?;
+                    return Ok(pairs);
+                }
             }
             if full {
                 return Err(SpectralError::NotConverged {
@@ -301,45 +339,43 @@ impl Problem<'_> {
         }
     }
 
-    /// λ of a Ritz pair.
-    fn value(&self, ritz: &Ritz, i: usize) -> f64 {
-        self.shift + 1.0 / ritz.theta[i]
+    /// λ of a Ritz value.
+    fn value(&self, theta: f64) -> f64 {
+        self.shift + 1.0 / theta
     }
 
     /// Estimated relative residual of a Ritz pair after the free step of [`Lanczos::vectors`]: ‖r‖ / (θ² λ).
     fn estimate(&self, ritz: &Ritz, i: usize, floor: f64) -> f64 {
         let theta = ritz.theta[i];
-        ritz.tail.col(i).norm_l2() / (theta * theta) / self.value(ritz, i).max(floor)
+        ritz.tail.col(i).norm_l2() / (theta * theta) / self.value(theta).max(floor)
     }
 
-    /// Ritz pairs by ascending λ, those in the gap between 0 and the negative axis left out, and the worst estimate of
-    /// the wanted ones.
-    fn choose(&self, ritz: &Ritz) -> (Vec<usize>, f64) {
-        let mut chosen: Vec<usize> = (0..ritz.theta.len())
-            .filter(|&i| self.value(ritz, i) >= -ZERO * self.shift && ritz.theta[i] != 0.0)
+    /// Places of Ritz values by ascending λ, those in the gap between 0 and the negative axis left out.
+    fn by_value(&self, theta: &[f64]) -> Vec<usize> {
+        let mut places: Vec<usize> = (0..theta.len())
+            .filter(|&i| self.value(theta[i]) >= -ZERO * self.shift && theta[i] != 0.0)
             .collect();
-        chosen.sort_by(|&a, &b| self.value(ritz, a).total_cmp(&self.value(ritz, b)));
-        if chosen.len() <= self.wanted {
-            return (chosen, f64::INFINITY);
-        }
-        let floor = ZERO * self.value(ritz, chosen[self.wanted - 1]);
-        let worst = chosen[..self.wanted]
-            .iter()
-            .map(|&i| self.estimate(ritz, i, floor))
-            .fold(0.0, f64::max);
-        (chosen, worst)
+        places.sort_by(|&a, &b| self.value(theta[a]).total_cmp(&self.value(theta[b])));
+        places
+    }
+
+    /// The largest estimate of the pairs; `last` is the largest eigenvalue wanted.
+    fn worst(&self, ritz: &Ritz, pairs: impl IntoIterator<Item = usize>, last: f64) -> f64 {
+        let estimates = pairs.into_iter().map(|i| self.estimate(ritz, i, ZERO * last));
+        // A NaN has not converged, so it stays.
+        estimates.fold(0.0, |m, x| if x > m || x.is_nan() { x } else { m })
     }
 
     /// Proves that no eigenvalue was missed: the inertia of S − μ I must count as many eigenvalues below μ as were
     /// found. μ lies in a gap just above the last wanted one, or, where that sits in a cluster, in one just below it.
     fn certify(&self, ritz: &Ritz, chosen: &[usize]) -> Result<(), SpectralError> {
-        let value = |j: usize| self.value(ritz, chosen[j]);
+        let value = |j: usize| self.value(ritz.theta[chosen[j]]);
         // Pairs whose eigenvalue is known well enough to tell where a gap is: the error is quadratic in the residual.
         let known = (self.wanted..chosen.len())
             .take_while(|&j| self.estimate(ritz, chosen[j], 0.0) < 1e-3)
             .last()
             .unwrap_or(self.wanted - 1);
-        let above = (self.wanted - 1..known).take(8);
+        let above = (self.wanted - 1..known).take(BEYOND);
         let below = (self.wanted.saturating_sub(40)..self.wanted - 1).rev();
         let wide = |j: &usize| value(j + 1) - value(*j) > 1e-4 * value(*j + 1);
         let Some(j) = above.chain(below).find(wide) else {
