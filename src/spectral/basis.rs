@@ -7,13 +7,13 @@
 
 use super::simd::{Simd, Vector, kernel, load, store};
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use faer::{Accum, MatMut, MatRef, Par};
 
 /// Rows per panel, and vectors projected at once.
 pub const WIDTH: usize = 8;
 
 /// Panels put in column-major order together for the product with a general matrix.
-const TOGETHER: usize = 48;
+const TOGETHER: usize = 24;
 
 /// One number for each of the vectors projected together.
 pub type Eight = [f64; WIDTH];
@@ -22,17 +22,20 @@ pub type Eight = [f64; WIDTH];
 pub struct Basis {
     n: usize,
     capacity: usize,
+    most: usize,
     columns: usize,
     /// Panel by panel; in each, capacity columns of WIDTH numbers. Rows beyond n are zero.
     values: Vec<Eight>,
 }
 
 impl Basis {
-    /// Room for `capacity` columns of n; memory is touched only as columns are added.
-    pub fn new(n: usize, capacity: usize) -> Self {
+    /// Room for `most` columns of n, at first for `expected` of them.
+    pub fn new(n: usize, expected: usize, most: usize) -> Self {
+        let capacity = expected.min(most);
         Self {
             n,
             capacity,
+            most,
             columns: 0,
             values: vec![[0.0; WIDTH]; n.div_ceil(WIDTH) * capacity],
         }
@@ -45,13 +48,30 @@ impl Basis {
 
     /// Whether `more` columns fit.
     pub fn has_room(&self, more: usize) -> bool {
-        self.columns + more <= self.capacity
+        self.columns + more <= self.most
     }
 
     /// Appends the B columns of a block.
     pub fn append<const B: usize>(&mut self, block: &[[f64; B]]) {
+        if self.columns + B > self.capacity {
+            self.grow(B);
+        }
         self.columns += B;
         self.overwrite_last(block);
+    }
+
+    /// Room for at least `more` columns, up to a quarter of what there is.
+    fn grow(&mut self, more: usize) {
+        let capacity = (self.capacity + self.capacity / 4)
+            .min(self.most)
+            .max(self.columns + more);
+        let mut values = vec![[0.0; WIDTH]; self.n.div_ceil(WIDTH) * capacity];
+        let old = self.values.chunks_exact(self.capacity);
+        for (new, old) in values.chunks_exact_mut(capacity).zip(old) {
+            new[..self.columns].copy_from_slice(&old[..self.columns]);
+        }
+        self.values = values;
+        self.capacity = capacity;
     }
 
     /// Replaces the last B columns.
@@ -75,23 +95,32 @@ impl Basis {
         h.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()))
     }
 
-    /// V Y for all columns in use: n × k, row by row.
-    pub fn times(&self, y: MatRef<'_, f64>) -> Vec<f64> {
+    /// V Y for all columns in use: n × k, row by row; row i goes to place `order[i]`.
+    pub fn times(&self, y: MatRef<'_, f64>, order: &[usize]) -> Vec<f64> {
+        const ROWS: usize = TOGETHER * WIDTH;
         let k = y.ncols();
         let mut x = vec![0.0; self.n * k];
-        let mut v = Mat::<f64>::zeros(TOGETHER * WIDTH, self.columns);
+        // Column-major for the product, and its result before its rows are put in their places.
+        let mut v = vec![0.0; ROWS * self.columns];
+        let mut product = vec![0.0; ROWS * k];
         let panels = self.values.chunks(TOGETHER * self.capacity);
-        for (panels, rows) in panels.zip(x.chunks_mut(TOGETHER * WIDTH * k)) {
+        for (panels, places) in panels.zip(order.chunks(ROWS)) {
             for (p, panel) in panels.chunks_exact(self.capacity).enumerate() {
-                for (c, column) in panel[..self.columns].iter().enumerate() {
-                    for (r, value) in column.iter().enumerate() {
-                        v[(p * WIDTH + r, c)] = *value;
-                    }
+                for (column, to) in panel[..self.columns].iter().zip(v.chunks_exact_mut(ROWS)) {
+                    to[p * WIDTH..(p + 1) * WIDTH].copy_from_slice(column);
                 }
             }
-            let count = rows.len() / k;
-            let x = MatMut::from_row_major_slice_mut(rows, count, k);
-            matmul(x, Accum::Replace, v.subrows(0, count), y, 1.0, Par::Seq);
+            matmul(
+                MatMut::from_row_major_slice_mut(&mut product, ROWS, k),
+                Accum::Replace,
+                MatRef::from_column_major_slice(&v, ROWS, self.columns),
+                y,
+                1.0,
+                Par::Seq,
+            );
+            for (row, &place) in product.chunks_exact(k).zip(places) {
+                x[place * k..(place + 1) * k].copy_from_slice(row);
+            }
         }
         x
     }
@@ -160,7 +189,7 @@ mod tests {
             (2.0 / n as f64).sqrt() * (frequency * (i as f64 + 0.5)).cos()
         };
         for simd in [Simd::detect(), Simd::Baseline] {
-            let mut basis = Basis::new(n, 12);
+            let mut basis = Basis::new(n, 5, 12);
             for group in 0..3 {
                 let block: Vec<[f64; 4]> = (0..n)
                     .map(|i| std::array::from_fn(|k| cosine(i, 4 * group + k)))
@@ -175,8 +204,9 @@ mod tests {
             assert!(basis.project_out(simd, 12, &mut p) < 1e-13);
             assert!(basis.project_out(simd, 11, &mut p) < 1e-13);
             let y = faer::Mat::from_fn(12, 3, |i, j| if i == 4 * j { 1.0 } else { 0.0 });
-            let x = basis.times(y.as_ref());
-            assert!((0..n).all(|i| (0..3).all(|j| x[i * 3 + j] == cosine(i, 4 * j))));
+            let order: Vec<usize> = (0..n).map(|i| n - 1 - i).collect();
+            let x = basis.times(y.as_ref(), &order);
+            assert!((0..n).all(|i| (0..3).all(|j| x[order[i] * 3 + j] == cosine(i, 4 * j))));
         }
     }
 }

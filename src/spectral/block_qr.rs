@@ -27,6 +27,11 @@ kernel! {
     fn multiply<const B: usize>(w: &mut [[f64; B]], h: &Small<B>) => multiply_body
 }
 
+kernel! {
+    /// W ← W H; returns WᵀW of the new W.
+    fn multiply_for_gram<const B: usize>(w: &mut [[f64; B]], h: &Small<B>) -> Small<B> => multiply_for_gram_body
+}
+
 #[inline(always)]
 fn inner_body<V: Vector, const B: usize>(x: &[[f64; B]], y: &[[f64; B]]) -> Small<B> {
     // Four rows of the product at a time, so that the sums stay in registers, and two sums for each.
@@ -71,6 +76,26 @@ fn multiply_body<V: Vector, const B: usize>(w: &mut [[f64; B]], h: &Small<B>) {
     }
 }
 
+#[inline(always)]
+fn multiply_for_gram_body<V: Vector, const B: usize>(w: &mut [[f64; B]], h: &Small<B>) -> Small<B> {
+    let mut gram = [V::splat(0.0); B];
+    for w in w.iter_mut() {
+        let mut row = V::splat(0.0);
+        for (x, h) in w.iter().zip(h) {
+            row = V::splat(*x).times_plus(load(h), row);
+        }
+        store(w, row);
+        for (sum, x) in gram.iter_mut().zip(w.iter()) {
+            *sum = V::splat(*x).times_plus(row, *sum);
+        }
+    }
+    let mut out = [[0.0; B]; B];
+    for (row, sum) in out.iter_mut().zip(gram) {
+        store(row, sum);
+    }
+    out
+}
+
 /// −H.
 pub fn negated<const B: usize>(h: &Small<B>) -> Small<B> {
     h.map(|row| row.map(|x| -x))
@@ -113,17 +138,29 @@ pub fn cholesky_qr<const B: usize>(simd: Simd, w: &mut [[f64; B]], negligible: f
 where
     [f64; B]: Row,
 {
-    let first = cholesky_step(simd, w, negligible)?;
-    let second = cholesky_step(simd, w, 0.0)?;
-    Some(product(&second, &first))
+    let gram = inner::<B>(simd, w, w);
+    cholesky_qr_from(simd, w, &gram, negligible)
 }
 
-/// One Cholesky-QR sweep; returns R.
-fn cholesky_step<const B: usize>(simd: Simd, w: &mut [[f64; B]], negligible: f64) -> Option<Small<B>>
+/// As [`cholesky_qr`] where the Gram matrix WᵀW is known.
+pub fn cholesky_qr_from<const B: usize>(
+    simd: Simd,
+    w: &mut [[f64; B]],
+    gram: &Small<B>,
+    negligible: f64,
+) -> Option<Small<B>>
 where
     [f64; B]: Row,
 {
-    let gram = inner::<B>(simd, w, w);
+    let first = cholesky(gram, negligible)?;
+    let gram = multiply_for_gram::<B>(simd, w, &upper_inverse(&first));
+    let second = cholesky(&gram, 0.0)?;
+    multiply::<B>(simd, w, &upper_inverse(&second));
+    Some(product(&second, &first))
+}
+
+/// The upper triangular R with RᵀR = `gram`; `None` where that is not safely of full rank.
+fn cholesky<const B: usize>(gram: &Small<B>, negligible: f64) -> Option<Small<B>> {
     let norm: [f64; B] = std::array::from_fn(|i| gram[i][i].sqrt());
     // A NaN must fail too, hence the negated comparison.
     if norm.iter().any(|x| !(*x > negligible && x.is_finite())) {
@@ -150,7 +187,6 @@ where
             *x *= n;
         }
     }
-    multiply::<B>(simd, w, &upper_inverse(&r));
     Some(r)
 }
 

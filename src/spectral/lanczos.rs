@@ -9,9 +9,10 @@
 use super::SpectralError;
 use super::band::Band;
 use super::basis::{Basis, Eight, WIDTH};
-use super::block_qr::{Small, add_product, cholesky_qr, inner, negated, product, transposed};
+use super::block_qr::{Small, add_product, cholesky_qr, cholesky_qr_from, inner, negated, product};
 use super::dense;
 use super::loss::Loss;
+use super::near::{Near, products, subtract, subtract_last};
 use super::normalised::NullSpace;
 use super::shift_invert::Factor;
 use super::simd::{Row, Simd};
@@ -23,12 +24,17 @@ use rand_chacha::ChaCha8Rng;
 pub struct Lanczos<'a, const B: usize> {
     factor: &'a Factor,
     null: &'a NullSpace,
+    /// The null vector if it is the only one, or zeros.
+    null_vector: Vec<f64>,
     simd: Simd,
     rng: ChaCha8Rng,
     /// Orthonormal columns; the last B of them are outside the projection.
     basis: Basis,
     previous: Vec<[f64; B]>,
     current: Vec<[f64; B]>,
+    spare: Vec<[f64; B]>,
+    /// Both blocks of a re-orthogonalisation.
+    pair: Vec<Eight>,
     /// Projection of OP on the basis: diagonal blocks A_j and the blocks R_j below them.
     diagonal: Vec<Small<B>>,
     below: Vec<Small<B>>,
@@ -49,11 +55,13 @@ impl<'a, const B: usize> Lanczos<'a, B>
 where
     [f64; B]: Row,
 {
-    /// Starts from a random block. `capacity` columns of basis are reserved, a multiple of B.
+    /// Starts from a random block. The basis has at most `capacity` columns, a multiple of B, and probably no more than
+    /// `expected`.
     pub fn new(
         n: usize,
         factor: &'a Factor,
         null: &'a NullSpace,
+        expected: usize,
         capacity: usize,
         mut rng: ChaCha8Rng,
     ) -> Result<Self, SpectralError> {
@@ -64,11 +72,17 @@ where
         let mut lanczos = Self {
             factor,
             null,
+            null_vector: match null.count {
+                1 => null.entry.clone(),
+                _ => vec![0.0; n],
+            },
             simd: Simd::detect(),
             rng,
-            basis: Basis::new(n, capacity + B),
-            previous: Vec::new(),
+            basis: Basis::new(n, expected + 2 * B, capacity + B),
+            previous: vec![[0.0; B]; n],
             current: Vec::new(),
+            spare: Vec::new(),
+            pair: vec![[0.0; WIDTH]; n],
             diagonal: Vec::new(),
             below: Vec::new(),
             loss: Loss::new(),
@@ -94,31 +108,33 @@ where
 
     /// One step: B more columns.
     pub fn step(&mut self) -> Result<(), SpectralError> {
-        let mut w = self.current.clone();
+        // The buffers of the step before the last serve again: fresh memory costs more than the arithmetic.
+        let mut w = std::mem::take(&mut self.spare);
+        w.clone_from(&self.current);
         self.factor.solve::<B>(&mut w);
-        let scale = w.iter().flatten().fold(0.0f64, |s, x| s + x * x).sqrt();
+        if self.null.count > 1 {
+            remove_null_space(self.null, &mut w);
+        }
+        let near = Near {
+            previous: &self.previous,
+            current: &self.current,
+            null: &self.null_vector,
+        };
+        let h = products::<B>(self.simd, &near, &w);
+        let scale = h.squares.iter().sum::<f64>().sqrt();
         if !scale.is_finite() {
             return Err(SpectralError::NotConverged {
                 detail: "the shifted solve overflowed".into(),
             });
         }
-        remove_null_space(self.null, &mut w);
-        if let Some(r) = self.below.last() {
-            add_product::<B>(self.simd, &mut w, &self.previous, &negated(&transposed(r)));
-        }
-        let a = inner::<B>(self.simd, &self.current, &w);
+        let a = &h.current;
         let a: Small<B> = std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (a[i][j] + a[j][i])));
-        add_product::<B>(self.simd, &mut w, &self.current, &negated(&a));
-        // Once more against the two neighbours: what cancellation left of them.
-        if !self.below.is_empty() {
-            let h = inner::<B>(self.simd, &self.previous, &w);
-            add_product::<B>(self.simd, &mut w, &self.previous, &negated(&h));
-        }
-        let h = inner::<B>(self.simd, &self.current, &w);
-        add_product::<B>(self.simd, &mut w, &self.current, &negated(&h));
+        // Once more: what cancellation left of them.
+        let left = subtract::<B>(self.simd, &near, &mut w, &h);
+        let gram = subtract_last::<B>(self.simd, &near, &mut w, &left);
 
         let rounding = 1e-13 * scale;
-        let r = match cholesky_qr::<B>(self.simd, &mut w, rounding) {
+        let r = match cholesky_qr_from::<B>(self.simd, &mut w, &gram, rounding) {
             Some(r) => {
                 let due = self.loss.advance(&self.diagonal, &self.below, &a, &r);
                 if due { self.reorthogonalise(&mut w, &r)? } else { r }
@@ -132,7 +148,8 @@ where
         self.diagonal.push(a);
         self.below.push(r);
         self.basis.append(&w);
-        self.previous = std::mem::replace(&mut self.current, w);
+        let current = std::mem::replace(&mut self.current, w);
+        self.spare = std::mem::replace(&mut self.previous, current);
         Ok(())
     }
 
@@ -141,17 +158,17 @@ where
     fn reorthogonalise(&mut self, w: &mut [[f64; B]], r: &Small<B>) -> Result<Small<B>, SpectralError> {
         let older = self.basis.columns() - B;
         let mut found = 0.0f64;
-        let mut pair = vec![[0.0; WIDTH]; w.len()];
+        let pair = &mut self.pair;
         // Vectors of both blocks, eight at a time.
         for first in (0..B).step_by(WIDTH / 2) {
             for ((p, c), w) in pair.iter_mut().zip(&self.current).zip(w.iter()) {
                 p[..WIDTH / 2].copy_from_slice(&c[first..first + WIDTH / 2]);
                 p[WIDTH / 2..].copy_from_slice(&w[first..first + WIDTH / 2]);
             }
-            let lost = self.basis.project_out(self.simd, older, &mut pair);
+            let lost = self.basis.project_out(self.simd, older, pair);
             // Beyond this one pass is not enough.
             if lost > 1e-4 {
-                self.basis.project_out(self.simd, older, &mut pair);
+                self.basis.project_out(self.simd, older, pair);
             }
             found = found.max(lost);
             for ((p, c), w) in pair.iter().zip(&mut self.current).zip(w.iter_mut()) {
@@ -258,11 +275,11 @@ where
         Ok(Ritz { theta, vectors, tail })
     }
 
-    /// Eigenvectors of S for the chosen Ritz pairs: n × k, row by row, unit columns.
+    /// Eigenvectors of S for the chosen Ritz pairs: n × k, row by row, unit columns; row i goes to place `order[i]`.
     ///
     /// Each is OP applied to the Ritz vector over its Ritz value, which costs no further solve because the recurrence
     /// knows OP V: x = V y + V_{m+1} (R_last y_last) / θ.
-    pub fn vectors(&self, ritz: &Ritz, chosen: &[usize]) -> Vec<f64> {
+    pub fn vectors(&self, ritz: &Ritz, chosen: &[usize], order: &[usize]) -> Vec<f64> {
         let (m, k) = (self.dimension(), chosen.len());
         let mut y = Mat::<f64>::zeros(m + B, k);
         for (q, &c) in chosen.iter().enumerate() {
@@ -276,7 +293,7 @@ where
                 y[(m + i, q)] = tail[i] / ritz.theta[c] * unit;
             }
         }
-        self.basis.times(y.as_ref())
+        self.basis.times(y.as_ref(), order)
     }
 }
 

@@ -13,6 +13,7 @@ mod dense;
 mod inverse_iteration;
 mod lanczos;
 mod loss;
+mod near;
 mod normalised;
 mod parts;
 mod residual;

@@ -265,18 +265,17 @@ fn solve_body<V: Vector, const B: usize>(factor: &Factor, x: &mut [[f64; B]]) {
             let scaled = V::splat(*d).times(load(row));
             store(row, scaled);
         }
-        for (rows, panel) in pattern.chunks(PANEL).zip(panels.chunks_exact(PANEL * node.size)) {
-            let mut gathered = [V::splat(0.0); PANEL];
-            for (g, &row) in gathered.iter_mut().zip(rows) {
-                *g = load(&later[row as usize - node.start - node.size]);
+        // Up to four columns at a time, their sums in registers across all panels.
+        let mut first = 0;
+        while first < node.size {
+            let panels = panels.chunks_exact(PANEL * node.size);
+            match node.size - first {
+                1 => backward::<V, 1, B>(own, later, first, node, pattern, panels),
+                2 => backward::<V, 2, B>(own, later, first, node, pattern, panels),
+                3 => backward::<V, 3, B>(own, later, first, node, pattern, panels),
+                _ => backward::<V, 4, B>(own, later, first, node, pattern, panels),
             }
-            for (l, y) in panel.as_chunks::<PANEL>().0.iter().zip(own.iter_mut()) {
-                let mut sum: V = load(y);
-                for k in 0..PANEL {
-                    sum = V::splat(l[k]).times_from(gathered[k], sum);
-                }
-                store(y, sum);
-            }
+            first += 4;
         }
         for i in (1..node.size).rev() {
             let (others, rest) = own.split_at_mut(i);
@@ -286,5 +285,34 @@ fn solve_body<V: Vector, const B: usize>(factor: &Factor, x: &mut [[f64; B]]) {
                 store(target, sum);
             }
         }
+    }
+}
+
+/// y ← y − Lᵀ x for C columns of a supernode from `first` on, x the rows below it.
+#[inline(always)]
+fn backward<'a, V: Vector, const C: usize, const B: usize>(
+    own: &mut [[f64; B]],
+    later: &[[f64; B]],
+    first: usize,
+    node: &Supernode,
+    pattern: &[u32],
+    panels: impl Iterator<Item = &'a [f64]>,
+) {
+    let mut sums = [[V::splat(0.0); 2]; C];
+    for (rows, panel) in pattern.chunks(PANEL).zip(panels) {
+        let mut gathered = [V::splat(0.0); PANEL];
+        for (g, &row) in gathered.iter_mut().zip(rows) {
+            *g = load(&later[row as usize - node.start - node.size]);
+        }
+        let panel = &panel.as_chunks::<PANEL>().0[first..first + C];
+        for c in 0..C {
+            for k in 0..PANEL {
+                sums[c][k % 2] = V::splat(panel[c][k]).times_from(gathered[k], sums[c][k % 2]);
+            }
+        }
+    }
+    for (y, [one, other]) in own[first..].iter_mut().zip(sums) {
+        let sum = one.plus(other).plus(load(y));
+        store(y, sum);
     }
 }
