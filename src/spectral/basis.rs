@@ -5,6 +5,7 @@
 //! share a pass. Rows, columns and vectors meet in registers only: eight rows of the block, or of the result, against
 //! one number of the basis. A general matrix product would copy the basis first.
 
+use super::scratch::Scratch;
 use super::simd::{Simd, Vector, kernel, load, store};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
@@ -24,8 +25,8 @@ pub struct Basis {
     capacity: usize,
     most: usize,
     columns: usize,
-    /// Panel by panel; in each, capacity columns of WIDTH numbers. Rows beyond n are zero.
-    values: Vec<Eight>,
+    /// Panel by panel; in each, capacity columns of WIDTH numbers. Rows beyond n are zero in the columns in use.
+    values: Scratch,
 }
 
 impl Basis {
@@ -37,7 +38,7 @@ impl Basis {
             capacity,
             most,
             columns: 0,
-            values: vec![[0.0; WIDTH]; n.div_ceil(WIDTH) * capacity],
+            values: Scratch::new(n.div_ceil(WIDTH) * capacity * WIDTH),
         }
     }
 
@@ -65,10 +66,10 @@ impl Basis {
         let capacity = (self.capacity + self.capacity / 4)
             .min(self.most)
             .max(self.columns + more);
-        let mut values = vec![[0.0; WIDTH]; self.n.div_ceil(WIDTH) * capacity];
-        let old = self.values.chunks_exact(self.capacity);
-        for (new, old) in values.chunks_exact_mut(capacity).zip(old) {
-            new[..self.columns].copy_from_slice(&old[..self.columns]);
+        let mut values = Scratch::new(self.n.div_ceil(WIDTH) * capacity * WIDTH);
+        let used = self.columns * WIDTH;
+        for (new, old) in values.chunks_exact_mut(capacity * WIDTH).zip(self.panels()) {
+            new[..used].copy_from_slice(&old.as_flattened()[..used]);
         }
         self.values = values;
         self.capacity = capacity;
@@ -77,14 +78,22 @@ impl Basis {
     /// Replaces the last B columns.
     pub fn overwrite_last<const B: usize>(&mut self, block: &[[f64; B]]) {
         let first = self.columns - B;
-        let panels = self.values.chunks_exact_mut(self.capacity);
+        let panels = self.values.chunks_exact_mut(self.capacity * WIDTH);
         for (panel, rows) in panels.zip(block.chunks(WIDTH)) {
-            for (k, column) in panel[first..first + B].iter_mut().enumerate() {
-                for (slot, row) in column.iter_mut().zip(rows) {
-                    *slot = row[k];
+            for (k, column) in panel.as_chunks_mut::<WIDTH>().0[first..first + B]
+                .iter_mut()
+                .enumerate()
+            {
+                for (r, slot) in column.iter_mut().enumerate() {
+                    *slot = rows.get(r).map_or(0.0, |row| row[k]);
                 }
             }
         }
+    }
+
+    /// The panels, one row of WIDTH numbers per column.
+    fn panels(&self) -> impl Iterator<Item = &[Eight]> {
+        self.values.as_chunks::<WIDTH>().0.chunks_exact(self.capacity)
     }
 
     /// P ← P − V (VᵀP) over the first `columns` columns; returns the largest |VᵀP|.
@@ -96,16 +105,16 @@ impl Basis {
     }
 
     /// V Y for all columns in use: n × k, row by row; row i goes to place `order[i]`.
-    pub fn times(&self, y: MatRef<'_, f64>, order: &[usize]) -> Vec<f64> {
+    pub fn times(&self, y: MatRef<'_, f64>, order: &[usize]) -> Scratch {
         const ROWS: usize = TOGETHER * WIDTH;
         let k = y.ncols();
-        let mut x = vec![0.0; self.n * k];
+        let mut x = Scratch::new(self.n * k);
         // Column-major for the product, and its result before its rows are put in their places.
-        let mut v = vec![0.0; ROWS * self.columns];
-        let mut product = vec![0.0; ROWS * k];
-        let panels = self.values.chunks(TOGETHER * self.capacity);
-        for (panels, places) in panels.zip(order.chunks(ROWS)) {
-            for (p, panel) in panels.chunks_exact(self.capacity).enumerate() {
+        let mut v = Scratch::new(ROWS * self.columns);
+        let mut product = Scratch::new(ROWS * k);
+        let mut panels = self.panels();
+        for places in order.chunks(ROWS) {
+            for (p, panel) in panels.by_ref().take(TOGETHER).enumerate() {
                 for (column, to) in panel[..self.columns].iter().zip(v.chunks_exact_mut(ROWS)) {
                     to[p * WIDTH..(p + 1) * WIDTH].copy_from_slice(column);
                 }
@@ -138,7 +147,7 @@ kernel! {
 
 #[inline(always)]
 fn inner_products_body<V: Vector, const W: usize>(basis: &Basis, block: &[Eight], h: &mut [Eight]) {
-    for (panel, rows) in basis.values.chunks_exact(basis.capacity).zip(block.chunks(WIDTH)) {
+    for (panel, rows) in basis.panels().zip(block.chunks(WIDTH)) {
         let mut p = [V::splat(0.0); WIDTH];
         for (p, row) in p.iter_mut().zip(rows) {
             *p = load(row);
@@ -155,11 +164,7 @@ fn inner_products_body<V: Vector, const W: usize>(basis: &Basis, block: &[Eight]
 
 #[inline(always)]
 fn subtract_products_body<V: Vector, const W: usize>(basis: &Basis, block: &mut [Eight], h: &[Eight]) {
-    for (panel, rows) in basis
-        .values
-        .chunks_exact(basis.capacity)
-        .zip(block.chunks_mut(WIDTH))
-    {
+    for (panel, rows) in basis.panels().zip(block.chunks_mut(WIDTH)) {
         let mut p = [V::splat(0.0); WIDTH];
         for (p, row) in p.iter_mut().zip(rows.iter()) {
             *p = load(row);

@@ -14,6 +14,7 @@ use super::dense;
 use super::loss::Loss;
 use super::near::{Near, products, subtract, subtract_last};
 use super::normalised::NullSpace;
+use super::scratch::Scratch;
 use super::shift_invert::Factor;
 use super::simd::{Row, Simd};
 use faer::Mat;
@@ -279,7 +280,7 @@ where
     ///
     /// Each is OP applied to the Ritz vector over its Ritz value, which costs no further solve because the recurrence
     /// knows OP V: x = V y + V_{m+1} (R_last y_last) / θ.
-    pub fn vectors(&self, ritz: &Ritz, chosen: &[usize], order: &[usize]) -> Vec<f64> {
+    pub fn vectors(&self, ritz: &Ritz, chosen: &[usize], order: &[usize]) -> Scratch {
         let (m, k) = (self.dimension(), chosen.len());
         let mut y = Mat::<f64>::zeros(m + B, k);
         for (q, &c) in chosen.iter().enumerate() {

@@ -9,6 +9,7 @@ use super::lanczos::{Lanczos, Ritz};
 use super::normalised::{Normalised, NullSpace};
 use super::parts::smallest_by_parts;
 use super::residual::{self, Check};
+use super::scratch::Scratch;
 use super::shift_invert::{Analysis, Factor};
 use super::simd::Row;
 use super::{EigenOptions, SpectralError};
@@ -21,7 +22,7 @@ pub struct Pairs {
     /// Ascending.
     pub values: Vec<f64>,
     /// n × k, row by row, in the order of S.
-    pub vectors: Vec<f64>,
+    pub vectors: Scratch,
     pub check: Check,
 }
 
@@ -100,8 +101,8 @@ pub fn smallest(
     let parts = s.parts();
     // More equal pieces than the widest block finds copies of an eigenvalue.
     if parts.len() > BLOCKS[BLOCKS.len() - 1] {
-        let pairs = smallest_by_parts(s, &parts, wanted, options, cancel, whole)?;
-        return accept(s, pairs, options.tolerance);
+        let (values, vectors) = smallest_by_parts(s, &parts, wanted, options, cancel, whole)?;
+        return accept(s, (values, vectors.into()), options.tolerance);
     }
     whole(s, wanted, options, cancel)
 }
@@ -131,7 +132,7 @@ fn whole(
     Err(SpectralError::NotConverged { detail: reason })
 }
 
-fn accept(s: &Normalised, pairs: (Vec<f64>, Vec<f64>), tolerance: f64) -> Result<Pairs, SpectralError> {
+fn accept(s: &Normalised, pairs: (Vec<f64>, Scratch), tolerance: f64) -> Result<Pairs, SpectralError> {
     let (values, vectors) = pairs;
     let floor = ZERO * values.last().copied().unwrap_or(0.0);
     let check = residual::check(s, &values, &vectors, floor);
@@ -152,7 +153,8 @@ fn accept(s: &Normalised, pairs: (Vec<f64>, Vec<f64>), tolerance: f64) -> Result
 }
 
 fn dense_pairs(s: &Normalised, wanted: usize, options: &EigenOptions) -> Result<Pairs, SpectralError> {
-    accept(s, dense::smallest(s, wanted)?, options.tolerance)
+    let (values, vectors) = dense::smallest(s, wanted)?;
+    accept(s, (values, vectors.into()), options.tolerance)
 }
 
 fn sparse_pairs(
