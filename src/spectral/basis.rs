@@ -1,23 +1,22 @@
 //! The Krylov basis, and the products of every re-orthogonalisation.
 //!
 //! The basis is kept in panels of eight rows; within a panel the columns follow each other, eight numbers each. Both
-//! products of a projection then stream contiguous memory once, and work on eight vectors at a time: two blocks of four
-//! share a pass. Rows, columns and vectors meet in registers only: eight rows of the block, or of the result, against
+//! products of a projection then stream contiguous memory once, for the vectors of two blocks together. Rows, columns and vectors meet in registers only: eight rows of the block, or of the result, against
 //! one number of the basis. A general matrix product would copy the basis first.
 
 use super::scratch::Scratch;
-use super::simd::{Simd, Vector, kernel, load, store};
+use super::simd::{Row, Simd, Vector, kernel, load, store};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 
-/// Rows per panel, and vectors projected at once.
-pub const WIDTH: usize = 8;
+/// Rows per panel.
+const WIDTH: usize = 8;
 
 /// Panels put in column-major order together for the product with a general matrix.
 const TOGETHER: usize = 24;
 
-/// One number for each of the vectors projected together.
-pub type Eight = [f64; WIDTH];
+/// A column of a panel.
+type Eight = [f64; WIDTH];
 
 /// n × capacity, of which the first `columns` columns are in use.
 pub struct Basis {
@@ -97,10 +96,13 @@ impl Basis {
     }
 
     /// P ← P − V (VᵀP) over the first `columns` columns; returns the largest |VᵀP|.
-    pub fn project_out(&self, simd: Simd, columns: usize, block: &mut [Eight]) -> f64 {
-        let mut h = vec![[0.0; WIDTH]; columns];
-        inner_products::<WIDTH>(simd, self, block, &mut h);
-        subtract_products::<WIDTH>(simd, self, block, &h);
+    pub fn project_out<const W: usize>(&self, simd: Simd, columns: usize, block: &mut [[f64; W]]) -> f64
+    where
+        [f64; W]: Row,
+    {
+        let mut h = vec![[0.0; W]; columns];
+        inner_products::<W>(simd, self, block, &mut h);
+        subtract_products::<W>(simd, self, block, &h);
         h.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()))
     }
 
@@ -137,16 +139,16 @@ impl Basis {
 
 kernel! {
     /// H ← H + VᵀP.
-    fn inner_products<const W: usize>(basis: &Basis, block: &[Eight], h: &mut [Eight]) => inner_products_body
+    fn inner_products<const W: usize>(basis: &Basis, block: &[[f64; W]], h: &mut [[f64; W]]) => inner_products_body
 }
 
 kernel! {
     /// P ← P − V H.
-    fn subtract_products<const W: usize>(basis: &Basis, block: &mut [Eight], h: &[Eight]) => subtract_products_body
+    fn subtract_products<const W: usize>(basis: &Basis, block: &mut [[f64; W]], h: &[[f64; W]]) => subtract_products_body
 }
 
 #[inline(always)]
-fn inner_products_body<V: Vector, const W: usize>(basis: &Basis, block: &[Eight], h: &mut [Eight]) {
+fn inner_products_body<V: Vector, const W: usize>(basis: &Basis, block: &[[f64; W]], h: &mut [[f64; W]]) {
     for (panel, rows) in basis.panels().zip(block.chunks(WIDTH)) {
         let mut p = [V::splat(0.0); WIDTH];
         for (p, row) in p.iter_mut().zip(rows) {
@@ -163,7 +165,7 @@ fn inner_products_body<V: Vector, const W: usize>(basis: &Basis, block: &[Eight]
 }
 
 #[inline(always)]
-fn subtract_products_body<V: Vector, const W: usize>(basis: &Basis, block: &mut [Eight], h: &[Eight]) {
+fn subtract_products_body<V: Vector, const W: usize>(basis: &Basis, block: &mut [[f64; W]], h: &[[f64; W]]) {
     for (panel, rows) in basis.panels().zip(block.chunks_mut(WIDTH)) {
         let mut p = [V::splat(0.0); WIDTH];
         for (p, row) in p.iter_mut().zip(rows.iter()) {

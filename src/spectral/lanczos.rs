@@ -8,7 +8,7 @@
 
 use super::SpectralError;
 use super::band::Band;
-use super::basis::{Basis, Eight, WIDTH};
+use super::basis::Basis;
 use super::block_qr::{Small, add_product, cholesky_qr, cholesky_qr_from, inner, negated, product};
 use super::dense;
 use super::loss::Loss;
@@ -34,8 +34,6 @@ pub struct Lanczos<'a, const B: usize> {
     previous: Vec<[f64; B]>,
     current: Vec<[f64; B]>,
     spare: Vec<[f64; B]>,
-    /// Both blocks of a re-orthogonalisation.
-    pair: Vec<Eight>,
     /// Projection of OP on the basis: diagonal blocks A_j and the blocks R_j below them.
     diagonal: Vec<Small<B>>,
     below: Vec<Small<B>>,
@@ -83,7 +81,6 @@ where
             previous: vec![[0.0; B]; n],
             current: Vec::new(),
             spare: Vec::new(),
-            pair: vec![[0.0; WIDTH]; n],
             diagonal: Vec::new(),
             below: Vec::new(),
             loss: Loss::new(),
@@ -154,29 +151,43 @@ where
         Ok(())
     }
 
+    /// Removes the first `older` columns of the basis from the current block and from `w`, W vectors at a time, half of
+    /// them of either; returns the largest product found.
+    fn project_pair<const W: usize>(&mut self, w: &mut [[f64; B]], older: usize) -> f64
+    where
+        [f64; W]: Row,
+    {
+        let half = W / 2;
+        let mut found = 0.0f64;
+        let mut memory = Scratch::new(w.len() * W);
+        let pair = memory.as_chunks_mut::<W>().0;
+        for first in (0..B).step_by(half) {
+            for ((p, c), w) in pair.iter_mut().zip(&self.current).zip(w.iter()) {
+                p[..half].copy_from_slice(&c[first..first + half]);
+                p[half..].copy_from_slice(&w[first..first + half]);
+            }
+            let lost = self.basis.project_out::<W>(self.simd, older, pair);
+            // Beyond this one pass is not enough.
+            if lost > 1e-4 {
+                self.basis.project_out::<W>(self.simd, older, pair);
+            }
+            found = found.max(lost);
+            for ((p, c), w) in pair.iter().zip(&mut self.current).zip(w.iter_mut()) {
+                c[first..first + half].copy_from_slice(&p[..half]);
+                w[first..first + half].copy_from_slice(&p[half..]);
+            }
+        }
+        found
+    }
+
     /// Removes the older basis from the current block and from the new one W = Q (with factor `r`), in one pass;
     /// returns the new factor.
     fn reorthogonalise(&mut self, w: &mut [[f64; B]], r: &Small<B>) -> Result<Small<B>, SpectralError> {
         let older = self.basis.columns() - B;
-        let mut found = 0.0f64;
-        let pair = &mut self.pair;
-        // Vectors of both blocks, eight at a time.
-        for first in (0..B).step_by(WIDTH / 2) {
-            for ((p, c), w) in pair.iter_mut().zip(&self.current).zip(w.iter()) {
-                p[..WIDTH / 2].copy_from_slice(&c[first..first + WIDTH / 2]);
-                p[WIDTH / 2..].copy_from_slice(&w[first..first + WIDTH / 2]);
-            }
-            let lost = self.basis.project_out(self.simd, older, pair);
-            // Beyond this one pass is not enough.
-            if lost > 1e-4 {
-                self.basis.project_out(self.simd, older, pair);
-            }
-            found = found.max(lost);
-            for ((p, c), w) in pair.iter().zip(&mut self.current).zip(w.iter_mut()) {
-                c[first..first + WIDTH / 2].copy_from_slice(&p[..WIDTH / 2]);
-                w[first..first + WIDTH / 2].copy_from_slice(&p[WIDTH / 2..]);
-            }
-        }
+        let found = match B {
+            4 => self.project_pair::<8>(w, older),
+            _ => self.project_pair::<16>(w, older),
+        };
         self.loss.reset_both(self.below.len(), found);
         self.basis.overwrite_last(&self.current);
         let h = inner::<B>(self.simd, &self.current, w);
@@ -192,12 +203,12 @@ where
     /// Gram-Schmidt against the whole basis with replacement, for a block that has (nearly) lost rank: columns that
     /// vanish are replaced by random ones with zeros in R.
     fn column_by_column(&mut self, w: &mut [[f64; B]], rounding: f64) -> Result<Small<B>, SpectralError> {
-        let norm = |column: &[Eight]| column.iter().map(|x| x[0] * x[0]).sum::<f64>().sqrt();
+        let norm = |column: &[[f64; 8]]| column.iter().map(|x| x[0] * x[0]).sum::<f64>().sqrt();
         let mut r = [[0.0; B]; B];
         for c in 0..B {
             // One vector; the other places of its rows stay zero.
             let alone = |x: f64| std::array::from_fn(|k| if k == 0 { x } else { 0.0 });
-            let mut column: Vec<Eight> = w.iter().map(|row| alone(row[c])).collect();
+            let mut column: Vec<[f64; 8]> = w.iter().map(|row| alone(row[c])).collect();
             let mut replaced = 0;
             loop {
                 let before = norm(&column);
@@ -215,7 +226,7 @@ where
                     continue;
                 }
                 self.basis
-                    .project_out(self.simd, self.basis.columns(), &mut column);
+                    .project_out::<8>(self.simd, self.basis.columns(), &mut column);
                 for k in 0..c {
                     let h: f64 = column.iter().zip(w.iter()).map(|(x, row)| x[0] * row[k]).sum();
                     for (x, row) in column.iter_mut().zip(w.iter()) {

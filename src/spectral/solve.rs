@@ -53,11 +53,21 @@ const DECADES_PER_COLUMN: f64 = 0.175;
 /// Size from which a step costs so much more than a look at the projection that looking early pays.
 const LOOK_EARLY: usize = 4000;
 
+/// Size from which blocks of eight come first: reading the factor and the basis half as often outweighs a larger
+/// subspace once neither fits the caches.
+const WIDE_FROM: usize = 40_000;
+
+/// The block sizes for n unknowns.
+fn blocks(n: usize) -> &'static [usize] {
+    &BLOCKS[usize::from(n >= WIDE_FROM)..]
+}
+
 /// Columns of the subspace of n unknowns at which convergence is first looked at for `wanted` pairs.
 fn first_subspace(n: usize, wanted: usize, block: usize) -> usize {
     let ratio = match block {
         0..=4 if n >= LOOK_EARLY => 1.52,
         0..=4 => 1.64,
+        5..=8 if n >= LOOK_EARLY => 1.68,
         5..=8 => 1.86,
         _ => 2.25,
     };
@@ -77,14 +87,15 @@ pub fn estimated_bytes(n: usize, wanted: usize) -> usize {
         // The matrix, its eigenvectors, as much workspace, and the result twice.
         return 8 * 4 * n * n + 2 * vectors;
     }
-    let m = first_subspace(n, wanted, BLOCKS[0]) + wanted / 16;
+    let block = blocks(n)[0];
+    let m = first_subspace(n, wanted, block) + wanted / 16;
     // The factor of a surface mesh has about 5 log2(n) entries per row, held twice while it is packed; S and its
     // permuted copy take another 40 numbers per row.
     let factor = 8 * n * (10 * n.ilog2() as usize + 40);
     // Projected problem: T, its eigenvectors, workspace, coefficients.
     let projected = 8 * 5 * m * m;
     // First the basis with the row-major vectors, then those with the result.
-    let basis = 8 * n * (m + 8 * BLOCKS[0]);
+    let basis = 8 * n * (m + 8 * block);
     factor + projected + vectors + basis.max(vectors)
 }
 
@@ -180,7 +191,7 @@ fn sparse_pairs(
         cancel,
     };
     let mut last = None;
-    for block in BLOCKS {
+    for &block in blocks(s.n) {
         let attempt = match block {
             4 => problem.attempt::<4>(),
             8 => problem.attempt::<8>(),
