@@ -6,6 +6,7 @@ The ratio is the median of the rounds' ratios, with its quartiles; `agree` says 
 
 import argparse
 import json
+import math
 import os
 import statistics
 import subprocess
@@ -139,14 +140,38 @@ def main():
         print(json.dumps(table.rows))
 
 
+def torus(target, around, along):
+    """A bumpy closed surface of around × along vertices without symmetry, in shuffled order."""
+    count = around * along
+    place = lambda i, j: (((i % along) * around + j % around) * 7919 + 13) % count
+    vertices, faces = [None] * count, []
+    for i in range(along):
+        for j in range(around):
+            u, v = 2 * math.pi * i / along, 2 * math.pi * (j + 0.3 * math.sin(3.7 * i)) / around
+            r = 0.4 + 0.08 * math.sin(3 * u + 1) * math.cos(2 * v) + 0.05 * math.cos(5 * u - v)
+            ring = 1 + 0.15 * math.sin(2 * u - 0.5)
+            x, y = (ring + r * math.cos(v)) * math.cos(u), (ring + r * math.cos(v)) * math.sin(u)
+            vertices[place(i, j)] = (1.3 * x, y, r * math.sin(v) + 0.1 * math.sin(u))
+            a, b, c, d = place(i, j), place(i + 1, j), place(i + 1, j + 1), place(i, j + 1)
+            faces += [(a, b, c), (a, c, d)]
+    with open(target, "w") as out:
+        out.write("".join("v %.9f %.9f %.9f\n" % p for p in vertices))
+        out.write("".join("f %d %d %d\n" % tuple(k + 1 for k in f) for f in faces))
+
+
 def eigen(table, ours, peer, zoo, scratch, label, quick):
     first = next(iter(zoo.values()))[0]
     inputs = [("zoo", first)]
-    for times in (1, 2) if quick else (1, 2, 3):  # About 9k, 35k and 140k vertices.
+    for times in (1, 2):  # About 9k and 35k vertices.
         finer = scratch / f"finer{times}.obj"
         if not finer.exists():
             subdivide(first, finer, times)
         inputs.append(("zoo, subdivided", str(finer)))
+    for around, along in () if quick else ((30, 50), (50, 100), (100, 200), (250, 400)):
+        mesh = scratch / f"torus{along}.obj"
+        if not mesh.exists():
+            torus(mesh, around, along)
+        inputs.append(("torus", str(mesh)))
     for path in ("tosca_lowres/cat/cat0.off", "sumner/cat/cat-reference.obj"):
         real = ROOT.parent / "shared" / "data" / path
         if real.exists():

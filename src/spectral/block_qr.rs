@@ -4,7 +4,7 @@
 //! two sweeps over the block, all in the inner loop's registers. A block that is close to rank-deficient is reported
 //! as such and goes to the caller's column-by-column fallback.
 
-use super::simd::{Simd, dispatch, fused};
+use super::simd::{Row, Simd, Vector, kernel, load, store};
 
 /// B × B, row by row.
 pub type Small<const B: usize> = [[f64; B]; B];
@@ -12,63 +12,88 @@ pub type Small<const B: usize> = [[f64; B]; B];
 /// Smallest pivot of the unit-diagonal Gram matrix that Cholesky-QR is trusted with: condition about 1e5.
 const SMALLEST_PIVOT: f64 = 1e-10;
 
-dispatch! {
+kernel! {
     /// XᵀY of two n × B blocks.
     pub fn inner<const B: usize>(x: &[[f64; B]], y: &[[f64; B]]) -> Small<B> => inner_body
 }
 
-dispatch! {
+kernel! {
     /// W ← W + X H.
     pub fn add_product<const B: usize>(w: &mut [[f64; B]], x: &[[f64; B]], h: &Small<B>) => add_product_body
 }
 
-dispatch! {
+kernel! {
     /// W ← W H.
     fn multiply<const B: usize>(w: &mut [[f64; B]], h: &Small<B>) => multiply_body
 }
 
+kernel! {
+    /// W ← W H; returns WᵀW of the new W.
+    fn multiply_for_gram<const B: usize>(w: &mut [[f64; B]], h: &Small<B>) -> Small<B> => multiply_for_gram_body
+}
+
 #[inline(always)]
-fn inner_body<const FMA: bool, const B: usize>(x: &[[f64; B]], y: &[[f64; B]]) -> Small<B> {
-    // Up to eight rows of the product at a time, so that the sums stay in registers.
-    const GROUP: usize = 8;
+fn inner_body<V: Vector, const B: usize>(x: &[[f64; B]], y: &[[f64; B]]) -> Small<B> {
+    // Four rows of the product at a time, so that the sums stay in registers, and two sums for each.
+    const GROUP: usize = 4;
     let mut out = [[0.0; B]; B];
     for first in (0..B).step_by(GROUP) {
-        let size = GROUP.min(B - first);
-        let mut sums = [[0.0; B]; GROUP];
-        for (a, b) in x.iter().zip(y) {
-            for (sum, a) in sums.iter_mut().take(size).zip(&a[first..]) {
-                for r in 0..B {
-                    sum[r] = fused::<FMA>(*a, b[r], sum[r]);
+        let mut sums = [[V::splat(0.0); GROUP]; 2];
+        for (a, b) in x.chunks(2).zip(y.chunks(2)) {
+            for ((a, b), sums) in a.iter().zip(b).zip(&mut sums) {
+                let b: V = load(b);
+                for (sum, a) in sums.iter_mut().zip(&a[first..]) {
+                    *sum = V::splat(*a).times_plus(b, *sum);
                 }
             }
         }
-        out[first..first + size].copy_from_slice(&sums[..size]);
+        for k in 0..GROUP {
+            store(&mut out[first + k], sums[0][k].plus(sums[1][k]));
+        }
     }
     out
 }
 
 #[inline(always)]
-fn add_product_body<const FMA: bool, const B: usize>(w: &mut [[f64; B]], x: &[[f64; B]], h: &Small<B>) {
+fn add_product_body<V: Vector, const B: usize>(w: &mut [[f64; B]], x: &[[f64; B]], h: &Small<B>) {
     for (w, x) in w.iter_mut().zip(x) {
-        for k in 0..B {
-            for r in 0..B {
-                w[r] = fused::<FMA>(x[k], h[k][r], w[r]);
-            }
+        let mut sum: V = load(w);
+        for (x, h) in x.iter().zip(h) {
+            sum = V::splat(*x).times_plus(load(h), sum);
         }
+        store(w, sum);
     }
 }
 
 #[inline(always)]
-fn multiply_body<const FMA: bool, const B: usize>(w: &mut [[f64; B]], h: &Small<B>) {
+fn multiply_body<V: Vector, const B: usize>(w: &mut [[f64; B]], h: &Small<B>) {
     for w in w.iter_mut() {
-        let mut out = [0.0; B];
-        for k in 0..B {
-            for r in 0..B {
-                out[r] = fused::<FMA>(w[k], h[k][r], out[r]);
-            }
+        let mut sum = V::splat(0.0);
+        for (x, h) in w.iter().zip(h) {
+            sum = V::splat(*x).times_plus(load(h), sum);
         }
-        *w = out;
+        store(w, sum);
     }
+}
+
+#[inline(always)]
+fn multiply_for_gram_body<V: Vector, const B: usize>(w: &mut [[f64; B]], h: &Small<B>) -> Small<B> {
+    let mut gram = [V::splat(0.0); B];
+    for w in w.iter_mut() {
+        let mut row = V::splat(0.0);
+        for (x, h) in w.iter().zip(h) {
+            row = V::splat(*x).times_plus(load(h), row);
+        }
+        store(w, row);
+        for (sum, x) in gram.iter_mut().zip(w.iter()) {
+            *sum = V::splat(*x).times_plus(row, *sum);
+        }
+    }
+    let mut out = [[0.0; B]; B];
+    for (row, sum) in out.iter_mut().zip(gram) {
+        store(row, sum);
+    }
+    out
 }
 
 /// −H.
@@ -109,15 +134,33 @@ pub fn upper_inverse<const B: usize>(r: &Small<B>) -> Small<B> {
 
 /// W = Q R in place, R upper triangular. `None`, with W unchanged in span but not orthonormal, when a column is all
 /// but a combination of the others or smaller than `negligible`.
-pub fn cholesky_qr<const B: usize>(simd: Simd, w: &mut [[f64; B]], negligible: f64) -> Option<Small<B>> {
-    let first = cholesky_step(simd, w, negligible)?;
-    let second = cholesky_step(simd, w, 0.0)?;
+pub fn cholesky_qr<const B: usize>(simd: Simd, w: &mut [[f64; B]], negligible: f64) -> Option<Small<B>>
+where
+    [f64; B]: Row,
+{
+    let gram = inner::<B>(simd, w, w);
+    cholesky_qr_from(simd, w, &gram, negligible)
+}
+
+/// As [`cholesky_qr`] where the Gram matrix WᵀW is known.
+pub fn cholesky_qr_from<const B: usize>(
+    simd: Simd,
+    w: &mut [[f64; B]],
+    gram: &Small<B>,
+    negligible: f64,
+) -> Option<Small<B>>
+where
+    [f64; B]: Row,
+{
+    let first = cholesky(gram, negligible)?;
+    let gram = multiply_for_gram::<B>(simd, w, &upper_inverse(&first));
+    let second = cholesky(&gram, 0.0)?;
+    multiply::<B>(simd, w, &upper_inverse(&second));
     Some(product(&second, &first))
 }
 
-/// One Cholesky-QR sweep; returns R.
-fn cholesky_step<const B: usize>(simd: Simd, w: &mut [[f64; B]], negligible: f64) -> Option<Small<B>> {
-    let gram = inner::<B>(simd, w, w);
+/// The upper triangular R with RᵀR = `gram`; `None` where that is not safely of full rank.
+fn cholesky<const B: usize>(gram: &Small<B>, negligible: f64) -> Option<Small<B>> {
     let norm: [f64; B] = std::array::from_fn(|i| gram[i][i].sqrt());
     // A NaN must fail too, hence the negated comparison.
     if norm.iter().any(|x| !(*x > negligible && x.is_finite())) {
@@ -144,7 +187,6 @@ fn cholesky_step<const B: usize>(simd: Simd, w: &mut [[f64; B]], negligible: f64
             *x *= n;
         }
     }
-    multiply::<B>(simd, w, &upper_inverse(&r));
     Some(r)
 }
 

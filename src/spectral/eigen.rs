@@ -88,11 +88,19 @@ pub(super) fn eigenpairs_of(
         for (slot, &value) in values[zeros..].iter_mut().zip(&pairs.values) {
             *slot = if value > floor { value } else { 0.0 };
         }
-        for (k, sign) in signs(s, &pairs.vectors, wanted).into_iter().enumerate() {
-            let column = vectors.col_mut(zeros + k);
-            let scaled = pairs.vectors[k..].iter().step_by(wanted).zip(&s.inv_sqrt_mass);
-            for (slot, (x, scale)) in column.iter_mut().zip(scaled) {
-                *slot = sign * x * scale;
+        let signs = signs(s, &pairs.vectors, wanted);
+        // From rows to columns in tiles that stay in the first-level cache.
+        const TILE: usize = 16;
+        for (tile, rows) in pairs.vectors.chunks(TILE * wanted).enumerate() {
+            let scales = &s.inv_sqrt_mass[tile * TILE..];
+            for (k, sign) in signs.iter().enumerate() {
+                let column = vectors
+                    .col_mut(zeros + k)
+                    .subrows_mut(tile * TILE, rows.len() / wanted);
+                let values = rows[k..].iter().step_by(wanted).zip(scales);
+                for (slot, (x, scale)) in column.iter_mut().zip(values) {
+                    *slot = sign * x * scale;
+                }
             }
         }
         residual = pairs.check.residual;

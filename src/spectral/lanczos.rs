@@ -7,13 +7,16 @@
 //! for two blocks at once (Grimes, Lewis and Simon 1994).
 
 use super::SpectralError;
+use super::band::Band;
 use super::basis::Basis;
-use super::block_qr::{Small, add_product, cholesky_qr, inner, negated, product, transposed};
+use super::block_qr::{Small, add_product, cholesky_qr, cholesky_qr_from, inner, negated, product};
 use super::dense;
 use super::loss::Loss;
+use super::near::{Near, products, subtract, subtract_last};
 use super::normalised::NullSpace;
+use super::scratch::Scratch;
 use super::shift_invert::Factor;
-use super::simd::Simd;
+use super::simd::{Row, Simd};
 use faer::Mat;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -22,34 +25,42 @@ use rand_chacha::ChaCha8Rng;
 pub struct Lanczos<'a, const B: usize> {
     factor: &'a Factor,
     null: &'a NullSpace,
+    /// The null vector if it is the only one, or zeros.
+    null_vector: Vec<f64>,
     simd: Simd,
     rng: ChaCha8Rng,
     /// Orthonormal columns; the last B of them are outside the projection.
     basis: Basis,
     previous: Vec<[f64; B]>,
     current: Vec<[f64; B]>,
+    spare: Vec<[f64; B]>,
     /// Projection of OP on the basis: diagonal blocks A_j and the blocks R_j below them.
     diagonal: Vec<Small<B>>,
     below: Vec<Small<B>>,
     loss: Loss<B>,
 }
 
-/// Eigenpairs of the projected operator.
+/// Eigenpairs of the projected operator, those asked for.
 pub struct Ritz {
     /// Ritz values of OP, ascending.
     pub theta: Vec<f64>,
-    /// m × m, one eigenvector per column.
+    /// m × k, one eigenvector per column.
     pub vectors: Mat<f64>,
-    /// B × m: R_last times the last B rows of `vectors`; the norm of a column is the residual of OP.
+    /// B × k: R_last times the last B rows of `vectors`; the norm of a column is the residual of OP.
     pub tail: Mat<f64>,
 }
 
-impl<'a, const B: usize> Lanczos<'a, B> {
-    /// Starts from a random block. `capacity` columns of basis are reserved, a multiple of B.
+impl<'a, const B: usize> Lanczos<'a, B>
+where
+    [f64; B]: Row,
+{
+    /// Starts from a random block. The basis has at most `capacity` columns, a multiple of B, and probably no more than
+    /// `expected`.
     pub fn new(
         n: usize,
         factor: &'a Factor,
         null: &'a NullSpace,
+        expected: usize,
         capacity: usize,
         mut rng: ChaCha8Rng,
     ) -> Result<Self, SpectralError> {
@@ -60,11 +71,16 @@ impl<'a, const B: usize> Lanczos<'a, B> {
         let mut lanczos = Self {
             factor,
             null,
+            null_vector: match null.count {
+                1 => null.entry.clone(),
+                _ => vec![0.0; n],
+            },
             simd: Simd::detect(),
             rng,
-            basis: Basis::new(n, capacity + B),
-            previous: Vec::new(),
+            basis: Basis::new(n, expected + 2 * B, capacity + B),
+            previous: vec![[0.0; B]; n],
             current: Vec::new(),
+            spare: Vec::new(),
             diagonal: Vec::new(),
             below: Vec::new(),
             loss: Loss::new(),
@@ -90,31 +106,33 @@ impl<'a, const B: usize> Lanczos<'a, B> {
 
     /// One step: B more columns.
     pub fn step(&mut self) -> Result<(), SpectralError> {
-        let mut w = self.current.clone();
+        // The buffers of the step before the last serve again: fresh memory costs more than the arithmetic.
+        let mut w = std::mem::take(&mut self.spare);
+        w.clone_from(&self.current);
         self.factor.solve::<B>(&mut w);
-        let scale = w.iter().flatten().fold(0.0f64, |s, x| s + x * x).sqrt();
+        if self.null.count > 1 {
+            remove_null_space(self.null, &mut w);
+        }
+        let near = Near {
+            previous: &self.previous,
+            current: &self.current,
+            null: &self.null_vector,
+        };
+        let h = products::<B>(self.simd, &near, &w);
+        let scale = h.squares.iter().sum::<f64>().sqrt();
         if !scale.is_finite() {
             return Err(SpectralError::NotConverged {
                 detail: "the shifted solve overflowed".into(),
             });
         }
-        remove_null_space(self.null, &mut w);
-        if let Some(r) = self.below.last() {
-            add_product::<B>(self.simd, &mut w, &self.previous, &negated(&transposed(r)));
-        }
-        let a = inner::<B>(self.simd, &self.current, &w);
+        let a = &h.current;
         let a: Small<B> = std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (a[i][j] + a[j][i])));
-        add_product::<B>(self.simd, &mut w, &self.current, &negated(&a));
-        // Once more against the two neighbours: what cancellation left of them.
-        if !self.below.is_empty() {
-            let h = inner::<B>(self.simd, &self.previous, &w);
-            add_product::<B>(self.simd, &mut w, &self.previous, &negated(&h));
-        }
-        let h = inner::<B>(self.simd, &self.current, &w);
-        add_product::<B>(self.simd, &mut w, &self.current, &negated(&h));
+        // Once more: what cancellation left of them.
+        let left = subtract::<B>(self.simd, &near, &mut w, &h);
+        let gram = subtract_last::<B>(self.simd, &near, &mut w, &left);
 
         let rounding = 1e-13 * scale;
-        let r = match cholesky_qr::<B>(self.simd, &mut w, rounding) {
+        let r = match cholesky_qr_from::<B>(self.simd, &mut w, &gram, rounding) {
             Some(r) => {
                 let due = self.loss.advance(&self.diagonal, &self.below, &a, &r);
                 if due { self.reorthogonalise(&mut w, &r)? } else { r }
@@ -128,24 +146,48 @@ impl<'a, const B: usize> Lanczos<'a, B> {
         self.diagonal.push(a);
         self.below.push(r);
         self.basis.append(&w);
-        self.previous = std::mem::replace(&mut self.current, w);
+        let current = std::mem::replace(&mut self.current, w);
+        self.spare = std::mem::replace(&mut self.previous, current);
         Ok(())
+    }
+
+    /// Removes the first `older` columns of the basis from the current block and from `w`, W vectors at a time, half of
+    /// them of either; returns the largest product found.
+    fn project_pair<const W: usize>(&mut self, w: &mut [[f64; B]], older: usize) -> f64
+    where
+        [f64; W]: Row,
+    {
+        let half = W / 2;
+        let mut found = 0.0f64;
+        let mut memory = Scratch::new(w.len() * W);
+        let pair = memory.as_chunks_mut::<W>().0;
+        for first in (0..B).step_by(half) {
+            for ((p, c), w) in pair.iter_mut().zip(&self.current).zip(w.iter()) {
+                p[..half].copy_from_slice(&c[first..first + half]);
+                p[half..].copy_from_slice(&w[first..first + half]);
+            }
+            let lost = self.basis.project_out::<W>(self.simd, older, pair);
+            // Beyond this one pass is not enough.
+            if lost > 1e-4 {
+                self.basis.project_out::<W>(self.simd, older, pair);
+            }
+            found = found.max(lost);
+            for ((p, c), w) in pair.iter().zip(&mut self.current).zip(w.iter_mut()) {
+                c[first..first + half].copy_from_slice(&p[..half]);
+                w[first..first + half].copy_from_slice(&p[half..]);
+            }
+        }
+        found
     }
 
     /// Removes the older basis from the current block and from the new one W = Q (with factor `r`), in one pass;
     /// returns the new factor.
     fn reorthogonalise(&mut self, w: &mut [[f64; B]], r: &Small<B>) -> Result<Small<B>, SpectralError> {
         let older = self.basis.columns() - B;
-        let mut pair: Vec<[[f64; B]; 2]> = self.current.iter().zip(w.iter()).map(|(c, w)| [*c, *w]).collect();
-        let found = self.basis.project_out::<B, 2>(self.simd, older, &mut pair);
-        // Beyond this one pass is not enough.
-        if found > 1e-4 {
-            self.basis.project_out::<B, 2>(self.simd, older, &mut pair);
-        }
-        for ((c, w), p) in self.current.iter_mut().zip(w.iter_mut()).zip(&pair) {
-            *c = p[0];
-            *w = p[1];
-        }
+        let found = match B {
+            4 => self.project_pair::<8>(w, older),
+            _ => self.project_pair::<16>(w, older),
+        };
         self.loss.reset_both(self.below.len(), found);
         self.basis.overwrite_last(&self.current);
         let h = inner::<B>(self.simd, &self.current, w);
@@ -161,10 +203,12 @@ impl<'a, const B: usize> Lanczos<'a, B> {
     /// Gram-Schmidt against the whole basis with replacement, for a block that has (nearly) lost rank: columns that
     /// vanish are replaced by random ones with zeros in R.
     fn column_by_column(&mut self, w: &mut [[f64; B]], rounding: f64) -> Result<Small<B>, SpectralError> {
-        let norm = |column: &[[[f64; 1]; 1]]| column.iter().map(|x| x[0][0] * x[0][0]).sum::<f64>().sqrt();
+        let norm = |column: &[[f64; 8]]| column.iter().map(|x| x[0] * x[0]).sum::<f64>().sqrt();
         let mut r = [[0.0; B]; B];
         for c in 0..B {
-            let mut column: Vec<[[f64; 1]; 1]> = w.iter().map(|row| [[row[c]]]).collect();
+            // One vector; the other places of its rows stay zero.
+            let alone = |x: f64| std::array::from_fn(|k| if k == 0 { x } else { 0.0 });
+            let mut column: Vec<[f64; 8]> = w.iter().map(|row| alone(row[c])).collect();
             let mut replaced = 0;
             loop {
                 let before = norm(&column);
@@ -175,18 +219,18 @@ impl<'a, const B: usize> Lanczos<'a, B> {
                             detail: "the Krylov basis cannot be extended".into(),
                         });
                     }
-                    let mut fresh: Vec<[f64; 1]> =
-                        column.iter().map(|_| [self.rng.random::<f64>() - 0.5]).collect();
-                    remove_null_space(self.null, &mut fresh);
-                    column = fresh.into_iter().map(|x| [x]).collect();
+                    for x in &mut column {
+                        x[0] = self.rng.random::<f64>() - 0.5;
+                    }
+                    remove_null_space(self.null, &mut column);
                     continue;
                 }
                 self.basis
-                    .project_out::<1, 1>(self.simd, self.basis.columns(), &mut column);
+                    .project_out::<8>(self.simd, self.basis.columns(), &mut column);
                 for k in 0..c {
-                    let h: f64 = column.iter().zip(w.iter()).map(|(x, row)| x[0][0] * row[k]).sum();
+                    let h: f64 = column.iter().zip(w.iter()).map(|(x, row)| x[0] * row[k]).sum();
                     for (x, row) in column.iter_mut().zip(w.iter()) {
-                        x[0][0] -= h * row[k];
+                        x[0] -= h * row[k];
                     }
                     if replaced == 0 {
                         r[k][c] += h;
@@ -200,39 +244,54 @@ impl<'a, const B: usize> Lanczos<'a, B> {
             let length = norm(&column);
             r[c][c] = if replaced > 0 { 0.0 } else { length };
             for (x, row) in column.iter().zip(w.iter_mut()) {
-                row[c] = x[0][0] / length;
+                row[c] = x[0] / length;
             }
         }
         Ok(r)
     }
 
-    /// The eigenpairs of the projection.
-    pub fn ritz(&self) -> Result<Ritz, SpectralError> {
-        let m = self.dimension();
-        let mut t = Mat::<f64>::zeros(m, m);
-        for (j, (a, r)) in self.diagonal.iter().zip(&self.below).enumerate() {
-            for i in 0..B {
-                for k in 0..B {
-                    t[(j * B + i, j * B + k)] = a[i][k];
-                    if (j + 1) * B < m {
-                        t[((j + 1) * B + i, j * B + k)] = r[i][k];
-                        t[(j * B + k, (j + 1) * B + i)] = r[i][k];
-                    }
-                }
+    /// The projection, a band: R is upper triangular.
+    fn projection(&self) -> Band<B> {
+        Band::new(self.dimension(), |i, j| {
+            let (block, column) = (j / B, j % B);
+            match i / B == block {
+                true => self.diagonal[block][i % B][column],
+                false => self.below[block][i % B][column],
             }
+        })
+    }
+
+    /// Eigenvalues of the projection, ascending.
+    pub fn ritz_values(&self) -> Result<Vec<f64>, SpectralError> {
+        match self.projection().eigenvalues() {
+            Some(theta) => Ok(theta),
+            None => Ok(dense::symmetric_eigen(self.projection().to_dense().as_ref())?.0),
         }
-        let (theta, vectors) = dense::symmetric_eigen(t.as_ref())?;
+    }
+
+    /// Eigenpairs of the projection: those at places `which` (ascending) of [`Lanczos::ritz_values`], `theta`.
+    pub fn ritz(&self, theta: &[f64], which: &[usize]) -> Result<Ritz, SpectralError> {
+        let projection = self.projection();
+        let chosen: Vec<f64> = which.iter().map(|&i| theta[i]).collect();
+        let (theta, vectors) = match projection.eigenvectors(&chosen) {
+            Some(vectors) => (chosen, vectors),
+            None => {
+                let (all, vectors) = dense::symmetric_eigen(projection.to_dense().as_ref())?;
+                let vectors = Mat::from_fn(vectors.nrows(), which.len(), |i, k| vectors[(i, which[k])]);
+                (which.iter().map(|&i| all[i]).collect(), vectors)
+            }
+        };
         let last = self.below.last().map_or([[0.0; B]; B], |r| *r);
         let last = Mat::<f64>::from_fn(B, B, |i, j| last[i][j]);
-        let tail = &last * vectors.as_ref().submatrix(m - B, 0, B, m);
+        let tail = &last * vectors.as_ref().subrows(vectors.nrows() - B, B);
         Ok(Ritz { theta, vectors, tail })
     }
 
-    /// Eigenvectors of S for the chosen Ritz pairs: n × k, row by row, unit columns.
+    /// Eigenvectors of S for the chosen Ritz pairs: n × k, row by row, unit columns; row i goes to place `order[i]`.
     ///
     /// Each is OP applied to the Ritz vector over its Ritz value, which costs no further solve because the recurrence
     /// knows OP V: x = V y + V_{m+1} (R_last y_last) / θ.
-    pub fn vectors(&self, ritz: &Ritz, chosen: &[usize]) -> Vec<f64> {
+    pub fn vectors(&self, ritz: &Ritz, chosen: &[usize], order: &[usize]) -> Scratch {
         let (m, k) = (self.dimension(), chosen.len());
         let mut y = Mat::<f64>::zeros(m + B, k);
         for (q, &c) in chosen.iter().enumerate() {
@@ -246,7 +305,7 @@ impl<'a, const B: usize> Lanczos<'a, B> {
                 y[(m + i, q)] = tail[i] / ritz.theta[c] * unit;
             }
         }
-        self.basis.times(y.as_ref())
+        self.basis.times(y.as_ref(), order)
     }
 }
 

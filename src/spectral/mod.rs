@@ -6,14 +6,18 @@ pub mod error;
 pub mod laplacian;
 pub mod mollify;
 
+mod band;
 mod basis;
 mod block_qr;
 mod dense;
+mod inverse_iteration;
 mod lanczos;
 mod loss;
+mod near;
 mod normalised;
 mod parts;
 mod residual;
+mod scratch;
 mod shift_invert;
 mod simd;
 mod solve;

@@ -29,6 +29,17 @@ pub struct NullSpace {
     pub count: usize,
 }
 
+impl NullSpace {
+    /// The same null space with rows in another order, `order[new] = old`.
+    pub fn permuted(&self, order: &[usize]) -> Self {
+        Self {
+            label: order.iter().map(|&o| self.label[o]).collect(),
+            entry: order.iter().map(|&o| self.entry[o]).collect(),
+            count: self.count,
+        }
+    }
+}
+
 impl Normalised {
     /// Scales the operators. Vertices with an entry in `keep` (ascending) survive; the rest are held at zero.
     pub fn new(operators: &Operators, keep: Option<&[usize]>) -> Result<Self, SpectralError> {
@@ -97,38 +108,6 @@ impl Normalised {
             .iter()
             .copied()
             .zip(self.values[range].iter().copied())
-    }
-
-    /// The same operator with rows and columns in another order, `order[new] = old`.
-    pub fn permuted(&self, order: &[usize]) -> Self {
-        let mut place = vec![0; self.n];
-        for (new, &old) in order.iter().enumerate() {
-            place[old] = new;
-        }
-        let mut pointers = Vec::with_capacity(self.n + 1);
-        let mut rows = Vec::with_capacity(self.rows.len());
-        let mut values = Vec::with_capacity(self.rows.len());
-        pointers.push(0);
-        for &old in order {
-            for (i, value) in self.column(old) {
-                rows.push(place[i]);
-                values.push(value);
-            }
-            pointers.push(rows.len());
-        }
-        Self {
-            n: self.n,
-            pointers,
-            rows,
-            values,
-            inv_sqrt_mass: order.iter().map(|&o| self.inv_sqrt_mass[o]).collect(),
-            norm: self.norm,
-            null: NullSpace {
-                label: order.iter().map(|&o| self.null.label[o]).collect(),
-                entry: order.iter().map(|&o| self.null.entry[o]).collect(),
-                count: self.null.count,
-            },
-        }
     }
 
     /// The vertices of every connected component, ascending; components by their first vertex.

@@ -5,6 +5,7 @@
 //! wide: dozens of equal pieces are beyond it. This is the way out.
 
 use super::normalised::Normalised;
+use super::scratch::Scratch;
 use super::solve::Pairs;
 use super::{EigenOptions, SpectralError};
 use crate::cancel::Cancel;
@@ -12,7 +13,7 @@ use crate::cancel::Cancel;
 /// What was found of one part: values ascending, vectors row by row.
 struct Found {
     values: Vec<f64>,
-    vectors: Vec<f64>,
+    vectors: Scratch,
     /// Whether there is no more that could be wanted.
     all: bool,
 }
@@ -38,7 +39,7 @@ pub fn smallest_by_parts(
         let most = wanted.min(part.len() - block.null.count);
         let count = count.min(most);
         let (values, vectors) = match count {
-            0 => (Vec::new(), Vec::new()),
+            0 => (Vec::new(), Scratch::default()),
             _ => {
                 let pairs = solve(&block, count, options, cancel)?;
                 (pairs.values, pairs.vectors)

@@ -30,7 +30,7 @@ pub fn check(s: &Normalised, values: &[f64], x: &[f64], floor: f64) -> Check {
     let k = values.len();
     let mut squares = vec![0.0; k];
     let mut row = vec![0.0; k];
-    squared_residuals::<1>(Simd::detect(), s, values, x, &mut row, &mut squares);
+    squared_residuals(Simd::detect(), s, values, x, &mut row, &mut squares);
     let rounding = 16.0 * f64::EPSILON * s.norm;
     let (mut residual, mut excess) = (0.0f64, 0.0f64);
     for (sum, &value) in squares.iter().zip(values) {
@@ -55,13 +55,13 @@ pub fn check(s: &Normalised, values: &[f64], x: &[f64], floor: f64) -> Check {
 }
 
 dispatch! {
-    fn squared_residuals<const ONE: usize>(
+    fn squared_residuals(
         s: &Normalised, values: &[f64], x: &[f64], row: &mut [f64], squares: &mut [f64],
     ) => squared_residuals_body
 }
 
 #[inline(always)]
-fn squared_residuals_body<const FMA: bool, const ONE: usize>(
+fn squared_residuals_body<const FMA: bool>(
     s: &Normalised,
     values: &[f64],
     x: &[f64],

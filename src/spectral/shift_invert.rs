@@ -7,7 +7,7 @@
 
 use super::SpectralError;
 use super::normalised::Normalised;
-use super::simd::{Simd, dispatch, fused};
+use super::simd::{Row, Simd, Vector, kernel, load, store};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -209,89 +209,110 @@ impl Analysis {
 }
 
 impl Factor {
+    /// The diagonal block of a supernode, the panels below it and the rows those stand for.
+    #[inline(always)]
+    fn parts(&self, node: &Supernode) -> (&[f64], &[f64], &[u32]) {
+        let pattern = &self.pattern[node.pattern..node.pattern_end];
+        let (diagonal, rest) = self.values[node.values..].split_at(node.size * node.size);
+        (diagonal, rest, pattern)
+    }
+
     /// x ← (S − c I)⁻¹ x for B right-hand sides; rows in the fill-reducing order, one array of B per row.
-    pub fn solve<const B: usize>(&self, x: &mut [[f64; B]]) {
+    pub fn solve<const B: usize>(&self, x: &mut [[f64; B]])
+    where
+        [f64; B]: Row,
+    {
         debug_assert_eq!(x.len(), self.n);
         solve_kernel::<B>(self.simd, self, x);
     }
 }
 
-dispatch! {
+kernel! {
     fn solve_kernel<const B: usize>(factor: &Factor, x: &mut [[f64; B]]) => solve_body
 }
 
 #[inline(always)]
-fn solve_body<const FMA: bool, const B: usize>(factor: &Factor, x: &mut [[f64; B]]) {
+fn solve_body<V: Vector, const B: usize>(factor: &Factor, x: &mut [[f64; B]]) {
     for node in &factor.supernodes {
-        let &Supernode { start, size, .. } = node;
-        let pattern = &factor.pattern[node.pattern..node.pattern_end];
-        let values = &factor.values[node.values..];
-        for i in 1..size {
-            let (solved, rest) = x[start..].split_at_mut(i);
-            let row = &values[i * size..i * size + i];
-            let mut acc = rest[0];
-            for (l, y) in row.iter().zip(solved.iter()) {
-                for r in 0..B {
-                    acc[r] = fused::<FMA>(-l, y[r], acc[r]);
-                }
+        let (diagonal, panels, pattern) = factor.parts(node);
+        let (own, later) = x[node.start..].split_at_mut(node.size);
+        for i in 1..node.size {
+            let mut sum: V = load(&own[i]);
+            for (l, y) in diagonal[i * node.size..][..i].iter().zip(own.iter()) {
+                sum = V::splat(*l).times_from(load(y), sum);
             }
-            rest[0] = acc;
+            store(&mut own[i], sum);
         }
-        let panels = values[size * size..].chunks_exact(PANEL * size);
-        for (rows, panel) in pattern.chunks(PANEL).zip(panels) {
-            let mut acc = [[0.0f64; B]; PANEL];
-            for (l, y) in panel.chunks_exact(PANEL).zip(&x[start..start + size]) {
+        for (rows, panel) in pattern.chunks(PANEL).zip(panels.chunks_exact(PANEL * node.size)) {
+            let mut sums = [V::splat(0.0); PANEL];
+            for (l, y) in panel.as_chunks::<PANEL>().0.iter().zip(own.iter()) {
+                let y: V = load(y);
                 for k in 0..PANEL {
-                    for r in 0..B {
-                        acc[k][r] = fused::<FMA>(l[k], y[r], acc[k][r]);
-                    }
+                    sums[k] = V::splat(l[k]).times_plus(y, sums[k]);
                 }
             }
-            for (&row, a) in rows.iter().zip(&acc) {
-                let target = &mut x[row as usize];
-                for r in 0..B {
-                    target[r] -= a[r];
-                }
+            for (&row, sum) in rows.iter().zip(sums) {
+                let target = &mut later[row as usize - node.start - node.size];
+                let difference = V::splat(-1.0).times_plus(sum, load(target));
+                store(target, difference);
             }
         }
     }
     for node in factor.supernodes.iter().rev() {
-        let &Supernode { start, size, .. } = node;
-        let pattern = &factor.pattern[node.pattern..node.pattern_end];
-        let values = &factor.values[node.values..];
-        for (row, d) in x[start..start + size]
-            .iter_mut()
-            .zip(&factor.inv_pivot[start..start + size])
-        {
-            for v in row {
-                *v *= d;
+        let (diagonal, panels, pattern) = factor.parts(node);
+        let (own, later) = x[node.start..].split_at_mut(node.size);
+        for (row, d) in own.iter_mut().zip(&factor.inv_pivot[node.start..]) {
+            let scaled = V::splat(*d).times(load(row));
+            store(row, scaled);
+        }
+        // Up to four columns at a time, their sums in registers across all panels.
+        let mut first = 0;
+        while first < node.size {
+            let panels = panels.chunks_exact(PANEL * node.size);
+            match node.size - first {
+                1 => backward::<V, 1, B>(own, later, first, node, pattern, panels),
+                2 => backward::<V, 2, B>(own, later, first, node, pattern, panels),
+                3 => backward::<V, 3, B>(own, later, first, node, pattern, panels),
+                _ => backward::<V, 4, B>(own, later, first, node, pattern, panels),
+            }
+            first += 4;
+        }
+        for i in (1..node.size).rev() {
+            let (others, rest) = own.split_at_mut(i);
+            let y: V = load(&rest[0]);
+            for (l, target) in diagonal[i * node.size..][..i].iter().zip(others) {
+                let sum = V::splat(*l).times_from(y, load(target));
+                store(target, sum);
             }
         }
-        let panels = values[size * size..].chunks_exact(PANEL * size);
-        for (rows, panel) in pattern.chunks(PANEL).zip(panels) {
-            let mut gathered = [[0.0f64; B]; PANEL];
-            for (g, &row) in gathered.iter_mut().zip(rows) {
-                *g = x[row as usize];
-            }
-            for (l, y) in panel.chunks_exact(PANEL).zip(&mut x[start..start + size]) {
-                let mut acc = *y;
-                for k in 0..PANEL {
-                    for r in 0..B {
-                        acc[r] = fused::<FMA>(-l[k], gathered[k][r], acc[r]);
-                    }
-                }
-                *y = acc;
+    }
+}
+
+/// y ← y − Lᵀ x for C columns of a supernode from `first` on, x the rows below it.
+#[inline(always)]
+fn backward<'a, V: Vector, const C: usize, const B: usize>(
+    own: &mut [[f64; B]],
+    later: &[[f64; B]],
+    first: usize,
+    node: &Supernode,
+    pattern: &[u32],
+    panels: impl Iterator<Item = &'a [f64]>,
+) {
+    let mut sums = [[V::splat(0.0); 2]; C];
+    for (rows, panel) in pattern.chunks(PANEL).zip(panels) {
+        let mut gathered = [V::splat(0.0); PANEL];
+        for (g, &row) in gathered.iter_mut().zip(rows) {
+            *g = load(&later[row as usize - node.start - node.size]);
+        }
+        let panel = &panel.as_chunks::<PANEL>().0[first..first + C];
+        for c in 0..C {
+            for k in 0..PANEL {
+                sums[c][k % 2] = V::splat(panel[c][k]).times_from(gathered[k], sums[c][k % 2]);
             }
         }
-        for i in (1..size).rev() {
-            let (others, rest) = x[start..].split_at_mut(i);
-            let row = &values[i * size..i * size + i];
-            let y = rest[0];
-            for (l, target) in row.iter().zip(others.iter_mut()) {
-                for r in 0..B {
-                    target[r] = fused::<FMA>(-l, y[r], target[r]);
-                }
-            }
-        }
+    }
+    for (y, [one, other]) in own[first..].iter_mut().zip(sums) {
+        let sum = one.plus(other).plus(load(y));
+        store(y, sum);
     }
 }
