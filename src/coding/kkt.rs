@@ -106,6 +106,7 @@ mod tests {
     use super::*;
     use crate::cancel::Cancel;
     use crate::coding::encode;
+    use crate::coding::scan::Rows;
     use faer::Mat;
 
     #[test]
@@ -117,7 +118,7 @@ mod tests {
         let problem = Problem {
             atoms: dictionary.atoms().as_ref(),
             gram: dictionary.gram().as_ref(),
-            rough_gram: faer::MatRef::from_column_major_slice(&[], 0, 0),
+            rough_gram: &Rows::default(),
             signal: signals.col_as_slice(0),
             norm: signals.norm_l2(),
             rough_correlation: &[],
