@@ -21,10 +21,12 @@ const ADDED_AT_ONCE: usize = 4;
 pub(super) struct Problem<'a> {
     /// D, M × L, columns contiguous.
     pub atoms: MatRef<'a, f64>,
-    /// DᵀD, L × L, columns contiguous.
-    pub gram: MatRef<'a, f64>,
+    /// DᵀD, L × L, columns contiguous, where it is known.
+    pub gram: Option<MatRef<'a, f64>>,
     /// DᵀD at single precision.
     pub rough_gram: &'a Rows,
+    /// Bound on the error of its entries beyond their own rounding.
+    pub rough_gram_error: f64,
     /// s, M values.
     pub signal: &'a [f64],
     /// ‖s‖.
@@ -75,11 +77,22 @@ pub(super) struct ActiveSet {
 }
 
 impl Problem<'_> {
+    /// d_iᵀd_j.
+    #[inline(always)]
+    pub fn product(&self, i: usize, j: usize) -> f64 {
+        match self.gram {
+            Some(gram) => column(gram, j)[i],
+            None => long_dot(column(self.atoms, i), column(self.atoms, j)),
+        }
+    }
+
     /// How far the gradient at single precision may be off under a code of so many non-zeros with so large a ‖a‖₁.
     #[inline(always)]
     pub fn gradient_error(&self, nonzeros: usize, norm1: f64) -> f64 {
         let terms = (nonzeros + 1) as f64;
-        self.error + 4.0 * f64::from(f32::EPSILON) * terms.sqrt() * (self.norm + norm1)
+        self.error
+            + 4.0 * f64::from(f32::EPSILON) * terms.sqrt() * (self.norm + norm1)
+            + self.rough_gram_error * norm1
     }
 }
 
@@ -124,7 +137,7 @@ impl ActiveSet {
     /// Solves `problem` from the set at hand. False where the step limit was met first.
     #[inline(always)]
     pub fn solve(&mut self, problem: &Problem<'_>) -> bool {
-        let limit = 100 + 8 * problem.gram.ncols();
+        let limit = 100 + 8 * problem.atoms.ncols();
         self.refused.clear();
         self.signal += 1;
         self.forward.clear();
@@ -201,10 +214,9 @@ impl ActiveSet {
 
     #[inline(always)]
     fn exact_gradient(&mut self, problem: &Problem<'_>, j: usize) -> f64 {
-        let gram = column(problem.gram, j);
         let mut gradient = self.correlation(problem, j);
         for (&i, value) in self.atoms.iter().zip(&self.values) {
-            gradient -= gram[i] * value;
+            gradient -= problem.product(i, j) * value;
         }
         gradient
     }
@@ -272,7 +284,7 @@ impl ActiveSet {
             return false;
         }
         self.doubtful.clear();
-        let count = problem.gram.ncols();
+        let count = problem.atoms.ncols();
         for (j, q) in self.gradient.as_flattened()[..count].iter().enumerate() {
             if q.abs() > perhaps {
                 self.doubtful.push(j);
@@ -284,7 +296,7 @@ impl ActiveSet {
             let gradient = self.exact_gradient(problem, j);
             if gradient.abs() > worst {
                 worst = gradient.abs();
-                let step = (gradient - problem.lambda * gradient.signum()) / column(problem.gram, j)[j];
+                let step = (gradient - problem.lambda * gradient.signum()) / problem.product(j, j);
                 self.added.clear();
                 self.added.push((j, step));
             }
@@ -311,10 +323,10 @@ impl ActiveSet {
 
     #[inline(always)]
     fn append(&mut self, problem: &Problem<'_>, j: usize, value: f64, sign: f64) -> bool {
-        let gram = column(problem.gram, j);
         self.column.clear();
-        self.column.extend(self.atoms.iter().map(|&i| gram[i]));
-        if !self.factor.push(&mut self.column, gram[j]) {
+        self.column
+            .extend(self.atoms.iter().map(|&i| problem.product(i, j)));
+        if !self.factor.push(&mut self.column, problem.product(j, j)) {
             return false;
         }
         self.atoms.push(j);

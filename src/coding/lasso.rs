@@ -4,6 +4,7 @@ use super::active_set::{ActiveSet, Problem};
 use super::cholesky::dot;
 use super::dispatch::{Kernel, fastest};
 use super::kkt::coordinate_descent;
+use super::path::REACH;
 use super::scan::pieces;
 use super::screen::ScreenMemory;
 use super::{CodingError, Dictionary, Signals};
@@ -245,10 +246,11 @@ impl Workspace {
             }
             let norm2 = signals.norms2[i];
             let rough = std::mem::take(&mut self.screen.correlations);
-            let problem = Problem {
+            let mut problem = Problem {
                 atoms: dictionary.atoms().as_ref(),
-                gram: dictionary.gram().as_ref(),
+                gram: dictionary.known_gram(),
                 rough_gram: &dictionary.screen().gram,
+                rough_gram_error: dictionary.screen().gram_error,
                 signal: signals.signal(i),
                 norm: norm2.sqrt(),
                 rough_correlation: &rough[(i - first) * width..][..width],
@@ -263,12 +265,16 @@ impl Workspace {
                 self.screen.correlations = rough;
                 continue;
             }
+            if self.set.path.count == REACH {
+                // Codes of many non-zeros take nearly all products of atoms.
+                problem.gram = Some(dictionary.gram().as_ref());
+            }
             if self.set.solve(&problem) {
                 let pairs = self.set.atoms.iter().zip(&self.set.values);
                 // L atoms of M values each are in memory, so their i fits 32 bits.
                 self.arena.extend(pairs.map(|(&j, &a)| (j as u32, a)));
             } else {
-                self.fall_back(&problem, i)?;
+                self.fall_back(&problem, dictionary, i)?;
             }
             let score = self.score(&problem, norm2, start, i)?;
             self.solved.push((self.arena.len(), score));
@@ -358,8 +364,13 @@ impl Workspace {
     /// Where the active set from the neighbour's code failed: once more from nothing, then coordinate descent.
     #[cold]
     #[inline(never)]
-    fn fall_back(&mut self, problem: &Problem<'_>, number: usize) -> Result<(), CodingError> {
-        let count = problem.gram.ncols();
+    fn fall_back(
+        &mut self,
+        problem: &Problem<'_>,
+        dictionary: &Dictionary,
+        number: usize,
+    ) -> Result<(), CodingError> {
+        let count = dictionary.len();
         self.set.reset(count);
         if self.set.solve(problem) {
             let pairs = self.set.atoms.iter().zip(&self.set.values);
@@ -371,7 +382,7 @@ impl Workspace {
         for (&j, &a) in self.set.atoms.iter().zip(&self.set.values) {
             self.code[j] = a;
         }
-        let violation = coordinate_descent(problem, &mut self.code);
+        let violation = coordinate_descent(problem, dictionary.gram().as_ref(), &mut self.code);
         if violation > FALL_BACK * problem.tolerance {
             return Err(CodingError::NotConverged {
                 signal: number,

@@ -11,7 +11,7 @@ use super::lasso::column;
 use super::scan::{first_crossing, largest_magnitude, move_towards, place_of, residual_gradient};
 
 /// Atoms that the path may hold. Beyond about so many the active set, which takes in several atoms at a look, is faster.
-const REACH: usize = 8;
+pub(super) const REACH: usize = 8;
 /// Steps after which rounding must have led the path in a circle.
 const STEPS: usize = 4 * REACH;
 /// The smallest pivot, relative to an atom's squared norm, that the path goes on with.
@@ -65,12 +65,12 @@ impl Path {
     /// Row `n` of the factor, from the rows before it.
     #[inline(always)]
     fn factorise(&mut self, problem: &Problem<'_>, n: usize) -> bool {
-        let gram = column(problem.gram, self.atoms[n]);
-        let diagonal = gram[self.atoms[n]];
+        let j = self.atoms[n];
+        let diagonal = problem.product(j, j);
         let mut pivot = diagonal;
         let mut row = [0.0; REACH];
         for i in 0..n {
-            let mut value = gram[self.atoms[i]];
+            let mut value = problem.product(self.atoms[i], j);
             for k in 0..i {
                 value -= self.factor[i][k] * row[k];
             }

@@ -2,6 +2,9 @@
 //!
 //! Rows are padded with zeros to whole [`Lanes`]; a zero violates nothing.
 
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::{Accum, MatMut, MatRef, Par};
+
 /// Values looked at side by side.
 const LANES: usize = 16;
 
@@ -38,6 +41,40 @@ impl Rows {
             }
         }
         Self { values, width }
+    }
+
+    /// DᵀD of L atoms at single precision, half of it computed and the other mirrored.
+    pub fn gram(atoms: MatRef<'_, f32>) -> Self {
+        let count = atoms.ncols();
+        let width = pieces(count);
+        let mut rows = Self {
+            values: vec![[0.0; LANES]; width * count],
+            width,
+        };
+        let stride = width * LANES;
+        let values = rows.values.as_flattened_mut();
+        matmul(
+            MatMut::from_column_major_slice_with_stride_mut(values, count, count, stride),
+            BlockStructure::TriangularLower,
+            Accum::Replace,
+            atoms.transpose(),
+            BlockStructure::Rectangular,
+            atoms,
+            BlockStructure::Rectangular,
+            1.0,
+            Par::Seq,
+        );
+        // Square by square, as neither rows nor columns alone stay in cache.
+        for first in (0..count).step_by(LANES) {
+            for second in (first..count).step_by(LANES) {
+                for j in first..count.min(first + LANES) {
+                    for i in second.max(j + 1)..count.min(second + LANES) {
+                        values[i * stride + j] = values[j * stride + i];
+                    }
+                }
+            }
+        }
+        rows
     }
 
     #[inline(always)]

@@ -28,6 +28,8 @@ pub(super) struct Screen {
     atoms: Mat<f32>,
     /// DᵀD, L × L.
     pub gram: Rows,
+    /// Bound on the error of its entries beyond their own rounding, for atoms of unit length.
+    pub gram_error: f64,
     /// max ‖t_j‖, 0 without projection.
     tail: f64,
 }
@@ -55,13 +57,25 @@ fn single(matrix: &Mat<f64>, columns: usize) -> Mat<f32> {
     rounded
 }
 
+fn rounded_gram(gram: &Mat<f64>) -> Rows {
+    Rows::new((0..gram.ncols()).map(|j| gram.col_as_slice(j)))
+}
+
+/// What a sum of so many terms loses at single precision, against the product of the lengths. Rounding in sums of m terms
+/// grows with √m (Higham and Mary 2019); 8 standard deviations.
+fn rounding_of_sums(terms: usize) -> f64 {
+    8.0 * f64::from(f32::EPSILON) * (terms as f64).sqrt()
+}
+
 impl Screen {
     /// Without projection: for a dictionary that codes few signals.
-    pub fn direct(atoms: &Mat<f64>, gram: &Mat<f64>) -> Self {
+    pub fn direct(atoms: &Mat<f64>) -> Self {
+        let rounded = single(atoms, padded(atoms.ncols()));
         Self {
             basis: None,
-            atoms: single(atoms, padded(atoms.ncols())),
-            gram: Rows::new((0..gram.ncols()).map(|j| gram.col_as_slice(j))),
+            gram: Rows::gram(rounded.subcols(0, atoms.ncols())),
+            gram_error: rounding_of_sums(atoms.nrows()),
+            atoms: rounded,
             tail: 0.0,
         }
     }
@@ -76,7 +90,11 @@ impl Screen {
             tail2: TAIL * TAIL * largest,
             most: most.min(m),
         }) else {
-            return Self::direct(atoms, gram);
+            return Self {
+                gram: rounded_gram(gram),
+                gram_error: 0.0,
+                ..Self::direct(atoms)
+            };
         };
         let mut chosen = Mat::zeros(m, pivots.len());
         for (k, &j) in pivots.iter().enumerate() {
@@ -100,7 +118,8 @@ impl Screen {
             tail: (tail2 + 1e-13 * largest).sqrt(),
             atoms: single(&projected, padded(l)),
             basis: Some(single(&basis, basis.ncols())),
-            gram: Rows::new((0..gram.ncols()).map(|j| gram.col_as_slice(j))),
+            gram: rounded_gram(gram),
+            gram_error: 0.0,
         }
     }
 
@@ -120,8 +139,7 @@ impl Screen {
             .correlations
             .resize(l * n / Lanes::default().len(), Lanes::default());
         memory.errors.clear();
-        // Rounding in sums of m terms grows with √m (Higham and Mary 2019); 8 standard deviations.
-        let rounding = 8.0 * f64::from(f32::EPSILON) * ((m as f64).sqrt() + (r as f64).sqrt());
+        let rounding = rounding_of_sums(m) + rounding_of_sums(r);
         let product = MatMut::from_column_major_slice_mut(memory.correlations.as_flattened_mut(), l, n);
         let Some(basis) = &self.basis else {
             matmul(
