@@ -12,7 +12,7 @@ use shapelex::pipeline::{Description, describe_query, describe_shape, learn_mode
 use shapelex::ranking::{Index, IndexedClass};
 use shapelex::spectral::{EigenOptions, Operators, assemble, smallest_eigenpairs};
 use std::error::Error;
-use std::io::{BufRead, Write};
+use std::io::{BufRead, Read, Write};
 use std::path::Path;
 use std::time::Instant;
 
@@ -300,15 +300,17 @@ fn write_matrix(path: &Path, matrix: &Mat<f64>) -> std::io::Result<()> {
     write(path, &columns.collect::<Vec<f64>>())
 }
 
+/// Reads as it goes, so that the file is not in memory twice.
 fn read_matrix(path: &Path, rows: usize) -> Result<Mat<f64>, Box<dyn Error>> {
-    let bytes = std::fs::read(path)?;
-    let values: Vec<f64> = bytes
-        .as_chunks::<8>()
-        .0
-        .iter()
-        .map(|c| f64::from_le_bytes(*c))
-        .collect();
-    Ok(Mat::from_fn(rows, values.len() / rows, |i, j| {
-        values[j * rows + i]
-    }))
+    let columns = std::fs::metadata(path)?.len() as usize / 8 / rows;
+    let mut file = std::io::BufReader::new(std::fs::File::open(path)?);
+    let mut matrix = Mat::zeros(rows, columns);
+    let mut value = [0; 8];
+    for j in 0..columns {
+        for to in matrix.col_as_slice_mut(j) {
+            file.read_exact(&mut value)?;
+            *to = f64::from_le_bytes(value);
+        }
+    }
+    Ok(matrix)
 }

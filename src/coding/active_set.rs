@@ -7,9 +7,10 @@
 //! search ends at the exact solution. Rounding can break the argument where atoms depend on each other; a step limit
 //! catches that, and the caller falls back to coordinate descent.
 
-use super::cholesky::{Factor, dot};
+use super::cholesky::{Factor, long_dot};
 use super::lasso::column;
-use super::scan::{largest_magnitude, place_of, step_along};
+use super::path::{Arrival, Path};
+use super::scan::{Lanes, Rows, largest_magnitude, pieces, place_of, residual_gradient, step_along};
 use faer::MatRef;
 
 /// Atoms added per look at the gradient: more saves looks, fewer saves atoms that must leave again.
@@ -20,23 +21,25 @@ const ADDED_AT_ONCE: usize = 4;
 pub(super) struct Problem<'a> {
     /// D, M × L, columns contiguous.
     pub atoms: MatRef<'a, f64>,
-    /// DᵀD, L × L, columns contiguous.
-    pub gram: MatRef<'a, f64>,
+    /// DᵀD, L × L, columns contiguous, where it is known.
+    pub gram: Option<MatRef<'a, f64>>,
     /// DᵀD at single precision.
-    pub rough_gram: MatRef<'a, f32>,
+    pub rough_gram: &'a Rows,
+    /// Bound on the error of its entries beyond their own rounding.
+    pub rough_gram_error: f64,
     /// s, M values.
     pub signal: &'a [f64],
     /// ‖s‖.
     pub norm: f64,
     /// Dᵀs to within `error`, L values.
-    pub rough_correlation: &'a [f32],
+    pub rough_correlation: &'a [Lanes],
     pub error: f64,
     pub lambda: f64,
     /// How far |d_jᵀ(s − Da)| may exceed λ.
     pub tolerance: f64,
 }
 
-/// The active set of the signal at hand; what it holds after one signal starts the next.
+/// The active set of the signal at hand.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ActiveSet {
     /// Atoms in the set, in the order of the factor's rows.
@@ -45,7 +48,14 @@ pub(super) struct ActiveSet {
     pub values: Vec<f64>,
     signs: Vec<f64>,
     factor: Factor,
-    gradient: Vec<f32>,
+    /// The search starts with what the path along which the code is sought first has come to.
+    pub path: Path,
+    /// The gradient at the code last looked at.
+    pub gradient: Vec<Lanes>,
+    /// The gradient at the level that the path has reached.
+    pub here: Vec<Lanes>,
+    /// Where on the rest of the path each |q_j| meets the level.
+    pub crossings: Vec<Lanes>,
     /// Whether correlations are taken at full precision; the search begins with the rough ones.
     exact: bool,
     /// max |q_j| over the atoms outside the set, at the last look.
@@ -66,32 +76,77 @@ pub(super) struct ActiveSet {
     refused: Vec<usize>,
 }
 
+impl Problem<'_> {
+    /// d_iᵀd_j.
+    #[inline(always)]
+    pub fn product(&self, i: usize, j: usize) -> f64 {
+        match self.gram {
+            Some(gram) => column(gram, j)[i],
+            None => long_dot(column(self.atoms, i), column(self.atoms, j)),
+        }
+    }
+
+    /// How far the gradient at single precision may be off under a code of so many non-zeros with so large a ‖a‖₁.
+    #[inline(always)]
+    pub fn gradient_error(&self, nonzeros: usize, norm1: f64) -> f64 {
+        let terms = (nonzeros + 1) as f64;
+        self.error
+            + 4.0 * f64::from(f32::EPSILON) * terms.sqrt() * (self.norm + norm1)
+            + self.rough_gram_error * norm1
+    }
+}
+
 impl ActiveSet {
     /// Empties the set, for a dictionary of `atoms` atoms.
     pub fn reset(&mut self, atoms: usize) {
+        self.empty();
+        self.refused.clear();
+        for row in [&mut self.gradient, &mut self.here, &mut self.crossings] {
+            row.resize(pieces(atoms), Lanes::default());
+        }
+        self.correlation.resize(atoms, 0.0);
+        self.known.resize(atoms, 0);
+    }
+
+    /// Takes all atoms out.
+    #[inline(always)]
+    fn empty(&mut self) {
         self.atoms.clear();
         self.values.clear();
         self.signs.clear();
         self.factor.clear();
         self.forward.clear();
-        self.refused.clear();
-        self.gradient.resize(atoms, 0.0);
-        self.correlation.resize(atoms, 0.0);
-        self.known.resize(atoms, 0);
+    }
+
+    /// Solves `problem` from nothing. True where `path` has the solution; otherwise the set is one to go on from.
+    #[inline(always)]
+    pub fn solve_by_path(&mut self, problem: &Problem<'_>) -> bool {
+        if self.trace(problem) == Arrival::Solved {
+            return true;
+        }
+        self.empty();
+        for k in 0..self.path.count {
+            let (j, value, sign) = (self.path.atoms[k], self.path.values[k], self.path.signs[k]);
+            if !self.append(problem, j, value, sign) {
+                break;
+            }
+        }
+        false
     }
 
     /// Solves `problem` from the set at hand. False where the step limit was met first.
     #[inline(always)]
     pub fn solve(&mut self, problem: &Problem<'_>) -> bool {
-        let limit = 100 + 8 * problem.rough_correlation.len();
+        let limit = 100 + 8 * problem.atoms.ncols();
         self.refused.clear();
         self.signal += 1;
         self.forward.clear();
         self.exact = false;
-        self.restart(problem);
+        self.descend(problem);
         for _ in 0..limit {
             self.update_gradient(problem);
-            let error = self.gradient_error(problem);
+            let norm1 = self.values.iter().map(|a| a.abs()).sum();
+            let error = problem.gradient_error(self.atoms.len(), norm1);
             if !self.find_violations(problem, error) {
                 if !self.exact {
                     let shift = self.sharpen(problem);
@@ -148,41 +203,22 @@ impl ActiveSet {
     #[inline(always)]
     pub fn correlation(&mut self, problem: &Problem<'_>, j: usize) -> f64 {
         if !self.exact {
-            return f64::from(problem.rough_correlation[j]);
+            return f64::from(problem.rough_correlation.as_flattened()[j]);
         }
         if self.known[j] != self.signal {
             self.known[j] = self.signal;
-            self.correlation[j] = dot(column(problem.atoms, j), problem.signal);
+            self.correlation[j] = long_dot(column(problem.atoms, j), problem.signal);
         }
         self.correlation[j]
     }
 
     #[inline(always)]
     fn exact_gradient(&mut self, problem: &Problem<'_>, j: usize) -> f64 {
-        let gram = column(problem.gram, j);
         let mut gradient = self.correlation(problem, j);
         for (&i, value) in self.atoms.iter().zip(&self.values) {
-            gradient -= gram[i] * value;
+            gradient -= problem.product(i, j) * value;
         }
         gradient
-    }
-
-    /// Takes the set of another signal over: drops the atoms whose value has the wrong sign until none has.
-    #[inline(always)]
-    fn restart(&mut self, problem: &Problem<'_>) {
-        loop {
-            self.solve_target(problem);
-            let before = self.atoms.len();
-            for k in (0..before).rev() {
-                if self.target[k] * self.signs[k] <= 0.0 {
-                    self.drop_atom(k);
-                }
-            }
-            if self.atoms.len() == before {
-                self.values.copy_from_slice(&self.target);
-                return;
-            }
-        }
     }
 
     /// target ← (G_AA)⁻¹ (c_A − λ sign). Only the rows of the factor that are new are solved forwards again.
@@ -201,32 +237,13 @@ impl ActiveSet {
     /// gradient ← c − G a, at single precision.
     #[inline(always)]
     fn update_gradient(&mut self, problem: &Problem<'_>) {
-        let gradient = &mut self.gradient[..];
-        gradient.copy_from_slice(problem.rough_correlation);
-        let pairs = self.atoms.chunks_exact(4).zip(self.values.chunks_exact(4));
-        for (atoms, values) in pairs {
-            let [g0, g1, g2, g3] = [0, 1, 2, 3].map(|k| column(problem.rough_gram, atoms[k]));
-            let [v0, v1, v2, v3] = [0, 1, 2, 3].map(|k| values[k] as f32);
-            let columns = g0.iter().zip(g1).zip(g2.iter().zip(g3));
-            for (q, ((a, b), (c, d))) in gradient.iter_mut().zip(columns) {
-                *q -= (v0 * a + v1 * b) + (v2 * c + v3 * d);
-            }
-        }
-        let rest = self.atoms.len() / 4 * 4;
-        for (&j, value) in self.atoms[rest..].iter().zip(&self.values[rest..]) {
-            let value = *value as f32;
-            for (q, g) in gradient.iter_mut().zip(column(problem.rough_gram, j)) {
-                *q -= value * g;
-            }
-        }
-    }
-
-    /// How far the gradient at single precision may be off.
-    #[inline(always)]
-    fn gradient_error(&self, problem: &Problem<'_>) -> f64 {
-        let norm1: f64 = self.values.iter().map(|a| a.abs()).sum();
-        let terms = (self.atoms.len() + 1) as f64;
-        problem.error + 4.0 * f64::from(f32::EPSILON) * terms.sqrt() * (problem.norm + norm1)
+        residual_gradient(
+            &mut self.gradient,
+            problem.rough_correlation,
+            problem.rough_gram,
+            &self.atoms,
+            &self.values,
+        );
     }
 
     /// Fills `added` with atoms outside the set that surely violate |q_j| ≤ λ: the worst, then the worst after the
@@ -238,7 +255,7 @@ impl ActiveSet {
         self.added.clear();
         for &j in self.atoms.iter().chain(&self.refused) {
             // Not a number compares as no violation, whatever is added to it.
-            self.gradient[j] = f32::NAN;
+            self.gradient.as_flattened_mut()[j] = f32::NAN;
         }
         let mut largest = largest_magnitude(&self.gradient);
         self.largest = f64::from(largest);
@@ -246,11 +263,11 @@ impl ActiveSet {
             let Some(j) = place_of(&self.gradient, largest) else {
                 break;
             };
-            let gradient = f64::from(self.gradient[j]);
-            let rough = column(problem.rough_gram, j);
-            let step = (gradient - problem.lambda * gradient.signum()) / f64::from(rough[j]);
+            let gradient = f64::from(self.gradient.as_flattened()[j]);
+            let rough = problem.rough_gram.row(j);
+            let step = (gradient - problem.lambda * gradient.signum()) / f64::from(rough.as_flattened()[j]);
             self.added.push((j, step));
-            self.gradient[j] = f32::NAN;
+            self.gradient.as_flattened_mut()[j] = f32::NAN;
             if self.added.len() < ADDED_AT_ONCE {
                 largest = step_along(&mut self.gradient, rough, step as f32);
             }
@@ -267,7 +284,8 @@ impl ActiveSet {
             return false;
         }
         self.doubtful.clear();
-        for (j, q) in self.gradient.iter().enumerate() {
+        let count = problem.atoms.ncols();
+        for (j, q) in self.gradient.as_flattened()[..count].iter().enumerate() {
             if q.abs() > perhaps {
                 self.doubtful.push(j);
             }
@@ -278,7 +296,7 @@ impl ActiveSet {
             let gradient = self.exact_gradient(problem, j);
             if gradient.abs() > worst {
                 worst = gradient.abs();
-                let step = (gradient - problem.lambda * gradient.signum()) / column(problem.gram, j)[j];
+                let step = (gradient - problem.lambda * gradient.signum()) / problem.product(j, j);
                 self.added.clear();
                 self.added.push((j, step));
             }
@@ -305,10 +323,10 @@ impl ActiveSet {
 
     #[inline(always)]
     fn append(&mut self, problem: &Problem<'_>, j: usize, value: f64, sign: f64) -> bool {
-        let gram = column(problem.gram, j);
         self.column.clear();
-        self.column.extend(self.atoms.iter().map(|&i| gram[i]));
-        if !self.factor.push(&mut self.column, gram[j]) {
+        self.column
+            .extend(self.atoms.iter().map(|&i| problem.product(i, j)));
+        if !self.factor.push(&mut self.column, problem.product(j, j)) {
             return false;
         }
         self.atoms.push(j);

@@ -3,13 +3,15 @@
 use super::CodingError;
 use super::screen::Screen;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::{Accum, Mat, Par};
+use faer::{Accum, Mat, MatRef, Par};
+use std::sync::OnceLock;
 
 /// A learnt dictionary D with its Gram matrix.
 #[derive(Clone, Debug)]
 pub struct Dictionary {
     atoms: Mat<f64>,
-    gram: Mat<f64>,
+    /// Computed at once for a dictionary that codes many signals, and for one that codes few only where it is missed.
+    gram: OnceLock<Mat<f64>>,
     screen: Screen,
 }
 
@@ -34,14 +36,18 @@ impl Dictionary {
         }
         let gram = gram(&atoms);
         let screen = Screen::new(&atoms, &gram);
+        let gram = OnceLock::from(gram);
         Ok(Self { atoms, gram, screen })
     }
 
     /// As [`Dictionary::new`] for atoms known to be sound, and quicker: for coding a few hundred signals and no more.
     pub(super) fn for_few_signals(atoms: Mat<f64>) -> Self {
-        let gram = gram(&atoms);
-        let screen = Screen::direct(&atoms, &gram);
-        Self { atoms, gram, screen }
+        let screen = Screen::direct(&atoms);
+        Self {
+            atoms,
+            gram: OnceLock::new(),
+            screen,
+        }
     }
 
     /// D, M × L, one atom per column.
@@ -51,7 +57,12 @@ impl Dictionary {
 
     /// DᵀD, L × L, symmetric.
     pub fn gram(&self) -> &Mat<f64> {
-        &self.gram
+        self.gram.get_or_init(|| gram(&self.atoms))
+    }
+
+    /// DᵀD where it has been computed.
+    pub(super) fn known_gram(&self) -> Option<MatRef<'_, f64>> {
+        self.gram.get().map(|gram| gram.as_ref())
     }
 
     pub(super) fn screen(&self) -> &Screen {

@@ -1,7 +1,7 @@
 //! The dictionary half of online learning: running sums, block-coordinate descent on the atoms, and what replaces
 //! atoms of no use (Mairal et al. 2010, Algorithm 2 and Section 3.4).
 
-use super::cholesky::dot;
+use super::cholesky::{dot, long_dot};
 use super::dispatch::{Kernel, fastest};
 use super::initialise::jittered;
 use super::lasso::column;
@@ -172,21 +172,30 @@ impl DictionaryUpdate {
     /// Hands the sums of an atom that nearly equals an earlier one over to that one; returns the atoms left over.
     #[inline(always)]
     fn merge_duplicates(&mut self, dictionary: &Dictionary) -> Vec<usize> {
-        let gram = dictionary.gram();
+        let screen = dictionary.screen();
         let count = self.idle.len();
         let mut duplicates = Vec::new();
-        let norms: Vec<f64> = (0..count).map(|j| gram[(j, j)].sqrt()).collect();
+        let product = |i: usize, j: usize| {
+            let atom = |k: usize| column(dictionary.atoms().as_ref(), k);
+            long_dot(atom(i), atom(j))
+        };
+        let norms: Vec<f64> = (0..count).map(|j| product(j, j).sqrt()).collect();
+        // Where single precision sees that none is near, none is.
+        let near = COHERENT - 2.0 * screen.gram_error - 2.0 * f64::from(f32::EPSILON);
+        let rough_norms: Vec<f32> = norms.iter().map(|norm| (near * norm) as f32).collect();
         for j in 0..count {
-            let products = &gram.col_as_slice(j)[..j];
-            let bound = COHERENT * norms[j];
+            let products = &screen.gram.row(j).as_flattened()[..j];
+            let norm = norms[j] as f32;
             let mut any = false;
-            for (product, norm) in products.iter().zip(&norms) {
-                any |= *product > bound * norm;
+            for (product, rough) in products.iter().zip(&rough_norms) {
+                any |= *product > norm * rough;
             }
             if !any {
                 continue;
             }
-            let twin = (0..j).find(|&i| products[i] > bound * norms[i]);
+            let twin = (0..j).find(|&i| {
+                products[i] > norm * rough_norms[i] && product(i, j) > COHERENT * norms[j] * norms[i]
+            });
             let Some(i) = twin.filter(|i| !duplicates.contains(i)) else {
                 continue;
             };

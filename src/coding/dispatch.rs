@@ -1,7 +1,7 @@
 //! Inner loops compiled twice, for any processor and for those with AVX2, chosen at run time.
 //!
-//! Both run the same sequence of roundings, so they give the same numbers. This is the only place of the coding that
-//! needs `unsafe`.
+//! Both run the same sequence of roundings, so they give the same numbers. The passes of `scan`, which compilers make
+//! poor vectors of, have forms of their own for AVX-512.
 
 /// A loop worth compiling for wider registers. `run` must be `#[inline(always)]`, and so must whatever it calls in
 /// its loops, or it keeps to the narrow ones.

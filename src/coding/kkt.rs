@@ -56,7 +56,7 @@ fn violation(gradient: f64, value: f64, lambda: f64) -> f64 {
 /// Cyclic coordinate descent on `code` (L values, any start), until no condition is violated by more than the
 /// problem's tolerance. Converges for every dictionary (Tseng 2001), slowly for coherent ones. Returns the violation
 /// that is left.
-pub(super) fn coordinate_descent(problem: &Problem<'_>, code: &mut [f64]) -> f64 {
+pub(super) fn coordinate_descent(problem: &Problem<'_>, gram: MatRef<'_, f64>, code: &mut [f64]) -> f64 {
     const SWEEPS: usize = 20_000;
     let correlation: Vec<f64> = (0..code.len())
         .map(|j| dot(column(problem.atoms, j), problem.signal))
@@ -69,7 +69,7 @@ pub(super) fn coordinate_descent(problem: &Problem<'_>, code: &mut [f64]) -> f64
             gradient.copy_from_slice(&correlation);
             for (j, &value) in code.iter().enumerate() {
                 if value != 0.0 {
-                    for (q, g) in gradient.iter_mut().zip(column(problem.gram, j)) {
+                    for (q, g) in gradient.iter_mut().zip(column(gram, j)) {
                         *q -= value * g;
                     }
                 }
@@ -83,16 +83,16 @@ pub(super) fn coordinate_descent(problem: &Problem<'_>, code: &mut [f64]) -> f64
             }
         }
         for j in 0..code.len() {
-            let gram = column(problem.gram, j);
-            if gram[j] <= 0.0 {
+            let column = column(gram, j);
+            if column[j] <= 0.0 {
                 continue;
             }
-            let free = gradient[j] + gram[j] * code[j];
-            let value = free.signum() * (free.abs() - problem.lambda).max(0.0) / gram[j];
+            let free = gradient[j] + column[j] * code[j];
+            let value = free.signum() * (free.abs() - problem.lambda).max(0.0) / column[j];
             let change = value - code[j];
             if change != 0.0 {
                 code[j] = value;
-                for (q, g) in gradient.iter_mut().zip(gram) {
+                for (q, g) in gradient.iter_mut().zip(column) {
                     *q -= change * g;
                 }
             }
@@ -106,6 +106,7 @@ mod tests {
     use super::*;
     use crate::cancel::Cancel;
     use crate::coding::encode;
+    use crate::coding::scan::Rows;
     use faer::Mat;
 
     #[test]
@@ -116,8 +117,9 @@ mod tests {
         let codes = encode(&dictionary, signals.as_ref(), 0.05, &Cancel::new()).unwrap();
         let problem = Problem {
             atoms: dictionary.atoms().as_ref(),
-            gram: dictionary.gram().as_ref(),
-            rough_gram: faer::MatRef::from_column_major_slice(&[], 0, 0),
+            gram: None,
+            rough_gram: &Rows::default(),
+            rough_gram_error: 0.0,
             signal: signals.col_as_slice(0),
             norm: signals.norm_l2(),
             rough_correlation: &[],
@@ -126,7 +128,7 @@ mod tests {
             tolerance: 1e-11,
         };
         let mut code = vec![0.0; 12];
-        assert!(coordinate_descent(&problem, &mut code) <= 1e-11);
+        assert!(coordinate_descent(&problem, dictionary.gram().as_ref(), &mut code) <= 1e-11);
         let nonzero: Vec<u32> = (0..12).filter(|&j| code[j as usize] != 0.0).collect();
         assert_eq!(nonzero, codes.atoms);
         assert!(nonzero.len() > 3);

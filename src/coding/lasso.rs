@@ -4,6 +4,8 @@ use super::active_set::{ActiveSet, Problem};
 use super::cholesky::dot;
 use super::dispatch::{Kernel, fastest};
 use super::kkt::coordinate_descent;
+use super::path::REACH;
+use super::scan::pieces;
 use super::screen::ScreenMemory;
 use super::{CodingError, Dictionary, Signals};
 use crate::cancel::Cancel;
@@ -11,7 +13,7 @@ use faer::MatRef;
 use std::ops::Range;
 
 /// Signals per product DᵀS: large enough for the product to run at full speed, small enough for it to stay in cache.
-const BLOCK: usize = 512;
+const BLOCK: usize = 256;
 /// Signals between two looks at the cancel flag.
 const CANCEL_EVERY: usize = 32;
 /// Optimality is met to this share of λ (plus the rounding of the products): max_j |d_jᵀ(s − Da)| ≤ λ (1 + 1e-9).
@@ -54,17 +56,17 @@ pub struct Workspace {
     set: ActiveSet,
     code: Vec<f64>,
     residual: Vec<f64>,
-    /// Codes of all signals, in the order they were found.
+    /// Codes of all signals, one after the other.
     arena: Vec<(u32, f64)>,
-    /// Where each signal's code begins and ends in `arena`, and what it cost; in the caller's order.
-    solved: Vec<(usize, usize, CodeScore)>,
+    /// Where each signal's code ends in `arena`, and what it cost.
+    solved: Vec<(usize, CodeScore)>,
 }
 
 /// Codes every column of `signals` (M × N): argmin_a ½‖s − D a‖² + λ‖a‖₁.
 ///
 /// Exact up to rounding: an active set with a Cholesky factor ends at the optimality conditions, which hold to 1e-9 λ.
-/// Signals are taken in an order in which those alike follow each other, each starting from the code before it; the
-/// order depends on the signals alone. An atom that is zero or a copy of another is harmless. λ above max |Dᵀs| gives
+/// Each signal starts from nothing along the Lasso path and, where its code has many non-zeros, goes on from there at λ,
+/// so a code does not depend on the other signals. An atom that is zero or a copy of another is harmless. λ above max |Dᵀs| gives
 /// an empty code.
 ///
 /// # Errors
@@ -109,12 +111,12 @@ pub fn encode_signals(
         residual2: Vec::with_capacity(n),
     };
     codes.offsets.push(0);
-    for &(start, end, score) in &workspace.solved {
-        for &(atom, value) in &workspace.arena[start..end] {
-            codes.atoms.push(atom);
-            codes.values.push(value);
-        }
-        codes.offsets.push(codes.atoms.len());
+    for &(atom, value) in &workspace.arena {
+        codes.atoms.push(atom);
+        codes.values.push(value);
+    }
+    for &(end, score) in &workspace.solved {
+        codes.offsets.push(end);
         codes.objective.push(score.objective);
         codes.residual2.push(score.residual2);
     }
@@ -130,7 +132,7 @@ pub fn score_signals(
     cancel: &Cancel,
 ) -> Result<Vec<CodeScore>, CodingError> {
     workspace.run(dictionary, signals, lambda, cancel)?;
-    Ok(workspace.solved.iter().map(|&(_, _, score)| score).collect())
+    Ok(workspace.solved.iter().map(|&(_, score)| score).collect())
 }
 
 pub(super) fn check_lambda(lambda: f64) -> Result<(), CodingError> {
@@ -208,14 +210,12 @@ impl Workspace {
         self.set.reset(dictionary.len());
         self.arena.clear();
         self.solved.clear();
-        self.solved.resize(signals.len(), (0, 0, CodeScore::default()));
         for first in (0..signals.len()).step_by(BLOCK) {
             cancel.check()?;
             let block = first..signals.len().min(first + BLOCK);
-            let single = signals.single.as_ref().subcols(first, block.len());
             dictionary
                 .screen()
-                .correlate(single, &signals.norms2[block.clone()], &mut self.screen);
+                .correlate(signals, block.clone(), &mut self.screen);
             fastest(CodeBlock {
                 workspace: self,
                 dictionary,
@@ -228,7 +228,7 @@ impl Workspace {
         Ok(())
     }
 
-    /// Codes the signals `block` (places in the order), whose correlations are in `screen`.
+    /// Codes the signals `block`, whose correlations are in `screen`.
     #[inline(always)]
     fn code_block(
         &mut self,
@@ -238,39 +238,71 @@ impl Workspace {
         lambda: f64,
         cancel: &Cancel,
     ) -> Result<(), CodingError> {
-        let count = dictionary.len();
+        let width = pieces(dictionary.len());
         let first = block.start;
-        for k in block {
-            if k % CANCEL_EVERY == 0 {
+        for i in block {
+            if i % CANCEL_EVERY == 0 {
                 cancel.check()?;
             }
-            let norm2 = signals.norms2[k];
+            let norm2 = signals.norms2[i];
             let rough = std::mem::take(&mut self.screen.correlations);
-            let problem = Problem {
+            let mut problem = Problem {
                 atoms: dictionary.atoms().as_ref(),
-                gram: dictionary.gram().as_ref(),
-                rough_gram: dictionary.screen().gram.as_ref(),
-                signal: signals.signal(k),
+                gram: dictionary.known_gram(),
+                rough_gram: &dictionary.screen().gram,
+                rough_gram_error: dictionary.screen().gram_error,
+                signal: signals.signal(i),
                 norm: norm2.sqrt(),
-                rough_correlation: &rough[(k - first) * count..][..count],
-                error: self.screen.errors[k - first],
+                rough_correlation: &rough[(i - first) * width..][..width],
+                error: self.screen.errors[i - first],
                 lambda,
                 tolerance: KKT_TOLERANCE * lambda + 1e-14 * norm2.sqrt(),
             };
-            let number = signals.order[k];
             let start = self.arena.len();
+            if self.set.solve_by_path(&problem) {
+                let score = self.path_score(&problem, norm2, i)?;
+                self.solved.push((self.arena.len(), score));
+                self.screen.correlations = rough;
+                continue;
+            }
+            if self.set.path.count == REACH {
+                // Codes of many non-zeros take nearly all products of atoms.
+                problem.gram = Some(dictionary.gram().as_ref());
+            }
             if self.set.solve(&problem) {
                 let pairs = self.set.atoms.iter().zip(&self.set.values);
-                // L atoms of M values each are in memory, so their number fits 32 bits.
+                // L atoms of M values each are in memory, so their i fits 32 bits.
                 self.arena.extend(pairs.map(|(&j, &a)| (j as u32, a)));
             } else {
-                self.fall_back(&problem, number)?;
+                self.fall_back(&problem, dictionary, i)?;
             }
-            let score = self.score(&problem, norm2, start, number)?;
-            self.solved[number] = (start, self.arena.len(), score);
+            let score = self.score(&problem, norm2, start, i)?;
+            self.solved.push((self.arena.len(), score));
             self.screen.correlations = rough;
         }
         Ok(())
+    }
+
+    /// Takes the code over that the path has ended with and says what it costs.
+    #[inline(always)]
+    fn path_score(
+        &mut self,
+        problem: &Problem<'_>,
+        norm2: f64,
+        number: usize,
+    ) -> Result<CodeScore, CodingError> {
+        let path = &self.set.path;
+        let start = self.arena.len();
+        let (mut norm1, mut product) = (0.0, 0.0);
+        for k in 0..path.count {
+            norm1 += path.values[k].abs();
+            product += path.correlations[k] * path.values[k];
+            self.arena.push((path.atoms[k] as u32, path.values[k]));
+        }
+        if path.count > 1 {
+            self.arena[start..].sort_unstable_by_key(|&(j, _)| j);
+        }
+        self.cost(problem, norm2, start, number, norm1, product)
     }
 
     /// Sorts the code that starts at `start` and says what it costs.
@@ -289,6 +321,20 @@ impl Workspace {
             norm1 += a.abs();
             product += self.set.correlation(problem, j as usize) * a;
         }
+        self.cost(problem, norm2, start, number, norm1, product)
+    }
+
+    #[inline(always)]
+    fn cost(
+        &mut self,
+        problem: &Problem<'_>,
+        norm2: f64,
+        start: usize,
+        number: usize,
+        norm1: f64,
+        product: f64,
+    ) -> Result<CodeScore, CodingError> {
+        let code = &self.arena[start..];
         // At the optimum aᵀGa = cᵀa − λ‖a‖₁.
         let mut residual2 = norm2 - product - problem.lambda * norm1;
         if residual2 < SMALL_RESIDUAL * norm2 {
@@ -318,8 +364,13 @@ impl Workspace {
     /// Where the active set from the neighbour's code failed: once more from nothing, then coordinate descent.
     #[cold]
     #[inline(never)]
-    fn fall_back(&mut self, problem: &Problem<'_>, number: usize) -> Result<(), CodingError> {
-        let count = problem.rough_correlation.len();
+    fn fall_back(
+        &mut self,
+        problem: &Problem<'_>,
+        dictionary: &Dictionary,
+        number: usize,
+    ) -> Result<(), CodingError> {
+        let count = dictionary.len();
         self.set.reset(count);
         if self.set.solve(problem) {
             let pairs = self.set.atoms.iter().zip(&self.set.values);
@@ -331,7 +382,7 @@ impl Workspace {
         for (&j, &a) in self.set.atoms.iter().zip(&self.set.values) {
             self.code[j] = a;
         }
-        let violation = coordinate_descent(problem, &mut self.code);
+        let violation = coordinate_descent(problem, dictionary.gram().as_ref(), &mut self.code);
         if violation > FALL_BACK * problem.tolerance {
             return Err(CodingError::NotConverged {
                 signal: number,

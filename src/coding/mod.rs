@@ -10,9 +10,12 @@ mod initialise;
 pub mod kkt;
 pub mod lasso;
 pub mod learn;
+mod path;
 mod scan;
 mod screen;
 pub mod signals;
+#[cfg(target_arch = "x86_64")]
+mod wide;
 
 pub use dictionary::Dictionary;
 pub use error::CodingError;

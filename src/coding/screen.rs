@@ -4,9 +4,12 @@
 //! small columns of T. Then d_jᵀs = r_jᵀ(Qᵀs) + t_jᵀs, and as t_j is orthogonal to Q the part left out is at most
 //! ‖t_j‖ · ‖s − QQᵀs‖, a product of two small numbers.
 
+use super::Signals;
 use super::dispatch::{Kernel, fastest};
+use super::scan::{Lanes, Rows, padded};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
+use std::ops::Range;
 
 /// The largest ‖t_j‖ of an atom against the largest atom.
 const TAIL: f64 = 1e-3;
@@ -21,10 +24,12 @@ const UNDERFLOW: f64 = 1e-34;
 pub(super) struct Screen {
     /// Q, M × r; `None` where D itself is multiplied.
     basis: Option<Mat<f32>>,
-    /// QᵀD, r × L, or D.
+    /// QᵀD, r × L, or D, padded by columns of zeros.
     atoms: Mat<f32>,
     /// DᵀD, L × L.
-    pub gram: Mat<f32>,
+    pub gram: Rows,
+    /// Bound on the error of its entries beyond their own rounding, for atoms of unit length.
+    pub gram_error: f64,
     /// max ‖t_j‖, 0 without projection.
     tail: f64,
 }
@@ -32,15 +37,18 @@ pub(super) struct Screen {
 /// What [`Screen::correlate`] reuses.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ScreenMemory {
+    /// The signals at single precision.
+    signals: Vec<f32>,
     projections: Vec<f32>,
-    /// Dᵀs of each signal of the block, L values each.
-    pub correlations: Vec<f32>,
+    /// Dᵀs of each signal of the block, L values each, padded.
+    pub correlations: Vec<Lanes>,
     /// Bound on the error of each signal's correlations.
     pub errors: Vec<f64>,
 }
 
-fn single(matrix: &Mat<f64>) -> Mat<f32> {
-    let mut rounded = Mat::zeros(matrix.nrows(), matrix.ncols());
+/// At single precision, with at least `columns` columns; those added are zero.
+fn single(matrix: &Mat<f64>, columns: usize) -> Mat<f32> {
+    let mut rounded = Mat::zeros(matrix.nrows(), columns);
     for j in 0..matrix.ncols() {
         for (to, from) in rounded.col_as_slice_mut(j).iter_mut().zip(matrix.col_as_slice(j)) {
             *to = *from as f32;
@@ -49,13 +57,25 @@ fn single(matrix: &Mat<f64>) -> Mat<f32> {
     rounded
 }
 
+fn rounded_gram(gram: &Mat<f64>) -> Rows {
+    Rows::new((0..gram.ncols()).map(|j| gram.col_as_slice(j)))
+}
+
+/// What a sum of so many terms loses at single precision, against the product of the lengths. Rounding in sums of m terms
+/// grows with √m (Higham and Mary 2019); 8 standard deviations.
+fn rounding_of_sums(terms: usize) -> f64 {
+    8.0 * f64::from(f32::EPSILON) * (terms as f64).sqrt()
+}
+
 impl Screen {
     /// Without projection: for a dictionary that codes few signals.
-    pub fn direct(atoms: &Mat<f64>, gram: &Mat<f64>) -> Self {
+    pub fn direct(atoms: &Mat<f64>) -> Self {
+        let rounded = single(atoms, padded(atoms.ncols()));
         Self {
             basis: None,
-            atoms: single(atoms),
-            gram: single(gram),
+            gram: Rows::gram(rounded.subcols(0, atoms.ncols())),
+            gram_error: rounding_of_sums(atoms.nrows()),
+            atoms: rounded,
             tail: 0.0,
         }
     }
@@ -70,7 +90,11 @@ impl Screen {
             tail2: TAIL * TAIL * largest,
             most: most.min(m),
         }) else {
-            return Self::direct(atoms, gram);
+            return Self {
+                gram: rounded_gram(gram),
+                gram_error: 0.0,
+                ..Self::direct(atoms)
+            };
         };
         let mut chosen = Mat::zeros(m, pivots.len());
         for (k, &j) in pivots.iter().enumerate() {
@@ -92,21 +116,31 @@ impl Screen {
             .fold(0.0, f64::max);
         Self {
             tail: (tail2 + 1e-13 * largest).sqrt(),
-            atoms: single(&projected),
-            basis: Some(single(&basis)),
-            gram: single(gram),
+            atoms: single(&projected, padded(l)),
+            basis: Some(single(&basis, basis.ncols())),
+            gram: rounded_gram(gram),
+            gram_error: 0.0,
         }
     }
 
-    /// Approximate Dᵀs for every column of `signals` (M × N), with ‖s‖² in `norms2`.
-    pub fn correlate(&self, signals: MatRef<'_, f32>, norms2: &[f64], memory: &mut ScreenMemory) {
-        let (m, n, l) = (signals.nrows(), signals.ncols(), self.atoms.ncols());
+    /// Approximate Dᵀs for the signals `block`.
+    pub fn correlate(&self, signals: &Signals<'_>, block: Range<usize>, memory: &mut ScreenMemory) {
+        let (m, n, l) = (signals.dimension(), block.len(), self.atoms.ncols());
+        let norms2 = &signals.norms2[block.clone()];
+        memory.signals.resize(m * n, 0.0);
+        fastest(Round {
+            signals,
+            block,
+            rounded: &mut memory.signals,
+        });
+        let signals = MatRef::from_column_major_slice(&memory.signals, m, n);
         let r = self.atoms.nrows();
-        memory.correlations.resize(l * n, 0.0);
+        memory
+            .correlations
+            .resize(l * n / Lanes::default().len(), Lanes::default());
         memory.errors.clear();
-        // Rounding in sums of m terms grows with √m (Higham and Mary 2019); 8 standard deviations.
-        let rounding = 8.0 * f64::from(f32::EPSILON) * ((m as f64).sqrt() + (r as f64).sqrt());
-        let product = MatMut::from_column_major_slice_mut(&mut memory.correlations, l, n);
+        let rounding = rounding_of_sums(m) + rounding_of_sums(r);
+        let product = MatMut::from_column_major_slice_mut(memory.correlations.as_flattened_mut(), l, n);
         let Some(basis) = &self.basis else {
             matmul(
                 product,
@@ -140,18 +174,66 @@ impl Screen {
             1.0,
             Par::Seq,
         );
-        for (norm2, projection) in norms2.iter().zip(memory.projections.chunks_exact(r)) {
+        fastest(Errors {
+            norms2,
+            projections: &memory.projections,
+            dimension: r,
+            tail: self.tail,
+            rounding,
+            errors: &mut memory.errors,
+        });
+    }
+}
+
+/// Bounds on the errors of projected correlations.
+struct Errors<'a> {
+    norms2: &'a [f64],
+    projections: &'a [f32],
+    dimension: usize,
+    tail: f64,
+    rounding: f64,
+    errors: &'a mut Vec<f64>,
+}
+
+impl Kernel for Errors<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let projections = self.projections.chunks_exact(self.dimension);
+        for (norm2, projection) in self.norms2.iter().zip(projections) {
             let kept = energy(projection);
             // What single precision cannot tell from zero counts as left out.
             let left_out = (norm2 - f64::from(kept)).max(0.0) + 1e-4 * norm2;
-            memory
-                .errors
-                .push(self.tail * left_out.sqrt() + rounding * norm2.sqrt() + UNDERFLOW);
+            self.errors
+                .push(self.tail * left_out.sqrt() + self.rounding * norm2.sqrt() + UNDERFLOW);
+        }
+    }
+}
+
+/// Signals at single precision, one after the other.
+struct Round<'a> {
+    signals: &'a Signals<'a>,
+    block: Range<usize>,
+    rounded: &'a mut [f32],
+}
+
+impl Kernel for Round<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let length = self.signals.dimension();
+        for (i, rounded) in self.block.zip(self.rounded.chunks_exact_mut(length.max(1))) {
+            for (to, from) in rounded.iter_mut().zip(self.signals.signal(i)) {
+                *to = *from as f32;
+            }
         }
     }
 }
 
 /// Σ y², in eight sums side by side.
+#[inline(always)]
 fn energy(values: &[f32]) -> f32 {
     let (chunks, rest) = values.as_chunks::<8>();
     let mut lanes = [0f32; 8];
