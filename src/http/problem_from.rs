@@ -118,6 +118,15 @@ pub fn index_empty() -> Problem {
     .with("next", "/v1/reindex")
 }
 
+/// The service shows the catalogue only: says where it says why.
+pub fn recovery_mode() -> Problem {
+    Problem::new(
+        Code::RecoveryMode,
+        "the service is in recovery mode: it shows the catalogue and changes nothing; /readyz and the log say why",
+    )
+    .with("retry_after_seconds", 30)
+}
+
 /// The index knows nothing for the baselines: says what to do next.
 pub fn baselines_missing(rank_by: &str) -> Problem {
     Problem::new(
@@ -165,6 +174,7 @@ impl From<StoreError> for Problem {
             )
             .with("retry_after_seconds", 30)
             .logged(detail),
+            StoreError::RecoveryMode { .. } => recovery_mode(),
             StoreError::Damaged { .. } => Self::new(
                 Code::Internal,
                 "a stored record is damaged; the log has it under this request id",
