@@ -43,6 +43,7 @@ impl From<MeshError> for Problem {
                 .with("found", found)
                 .with("limit", limit),
             MeshError::NoAnimation => of(Code::NoAnimation),
+            MeshError::Cancelled(_) => of(Code::Cancelled),
             MeshError::Invalid { .. } => of(Code::InvalidMesh),
         }
     }
