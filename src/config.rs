@@ -98,6 +98,8 @@ macro_rules! settings {
 settings! {
     /// Directory that holds everything the service must not forget
     data: PathBuf = PathBuf::from(DEFAULT_DATA), "SHAPELEX_DATA", "DIR";
+    /// Serve the catalogue only: no index is loaded, no job runs, nothing is changed
+    recovery_mode: bool = false, "SHAPELEX_RECOVERY_MODE", "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true";
     /// Address and port to listen on; port 0 takes a free one and says which
     listen: SocketAddr = DEFAULT_LISTEN, "SHAPELEX_LISTEN", "ADDRESS";
     /// Answer requests without an API key beyond loopback too, as long as no key exists
@@ -124,6 +126,8 @@ settings! {
     slow_query_ms: u64 = 0, "SHAPELEX_SLOW_QUERY_MS", "MILLISECONDS";
     /// Log level (error, warn, info, debug, trace, off), or a list of target=level
     log: String = "info".to_owned(), "SHAPELEX_LOG", "FILTER";
+    /// OpenTelemetry collector that gets traces (OTLP over HTTP), such as http://127.0.0.1:4318; none for no traces
+    otlp_endpoint: String = String::new(), "SHAPELEX_OTLP_ENDPOINT", "URL";
     /// How log lines are written
     log_format: LogFormat = LogFormat::Text, "SHAPELEX_LOG_FORMAT", "FORMAT";
     /// Preset the first reindex starts from, where it names none
@@ -247,6 +251,13 @@ impl Config {
                 found: origin.clone(),
             });
         }
+        if !self.otlp_endpoint.is_empty() && !self.otlp_endpoint.starts_with("http://") {
+            return Err(ConfigError::OutOfRange {
+                name: "otlp_endpoint",
+                expected: "an address that begins with http://",
+                found: self.otlp_endpoint.clone(),
+            });
+        }
         if !(8..=1024).contains(&self.max_header_kib) {
             return Err(ConfigError::OutOfRange {
                 name: "max_header_kib",
@@ -285,6 +296,7 @@ impl Config {
             },
             slow_query: Some(Duration::from_millis(self.slow_query_ms)).filter(|d| !d.is_zero()),
             data_dir: self.data.clone(),
+            recovery_mode: self.recovery_mode,
             store: StoreOptions {
                 cache_bytes: self.cache_mib << 20,
             },

@@ -57,29 +57,41 @@ pub fn ask(service: &Service, client: usize, until: Instant) -> Vec<Sample> {
     samples
 }
 
-/// Sends a query that takes seconds, leaves it in the middle, and returns the milliseconds until no work of it is done
-/// any more.
-pub fn time_to_stop(service: &Service) -> f64 {
+/// The time a query with this mesh computes, alone.
+pub fn time_to_answer(service: &Service, mesh: &[u8]) -> Duration {
+    let answer = service
+        .agent()
+        .post(service.url("/v1/query"))
+        .content_type("model/obj")
+        .send(mesh);
+    let text = answer
+        .and_then(|mut answer| answer.body_mut().read_to_string())
+        .unwrap_or_default();
+    let answer: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    Duration::from_secs_f64(answer["timings_ms"]["total"].as_f64().expect("an answer") / 1e3)
+}
+
+/// Sends a query, leaves it so long after its work has begun, and returns the milliseconds until no work of it is done
+/// any more. `None` where it was done before.
+pub fn time_to_stop(service: &Service, mesh: &[u8], after: Duration) -> Option<f64> {
     let mut stream = TcpStream::connect(service.address()).expect("a connection");
     let head = format!(
         "POST /v1/query HTTP/1.1\r\nhost: {}\r\ncontent-type: model/obj\r\ncontent-length: {}\r\n\r\n",
         service.address(),
-        service.large.len()
+        mesh.len()
     );
     stream.write_all(head.as_bytes()).expect("sent");
-    stream.write_all(&service.large).expect("sent");
+    stream.write_all(mesh).expect("sent");
     let sent = Instant::now();
-    while service.gauge("shapelex_compute_running") < 1.0 && sent.elapsed() < Duration::from_secs(5) {
-        std::thread::sleep(Duration::from_millis(1));
+    while service.gauge("shapelex_compute_running") < 1.0 && sent.elapsed() < Duration::from_secs(5) {}
+    std::thread::sleep(after);
+    if service.gauge("shapelex_compute_running") < 1.0 {
+        return None;
     }
-    // At another moment of the work each time.
-    std::thread::sleep(Duration::from_millis(u64::from(
-        sent.elapsed().subsec_nanos() % 160,
-    )));
     drop(stream);
     let left = Instant::now();
     while service.gauge("shapelex_compute_running") > 0.0 && left.elapsed() < Duration::from_secs(60) {}
-    left.elapsed().as_secs_f64() * 1e3
+    Some(left.elapsed().as_secs_f64() * 1e3)
 }
 
 /// A share's quantile by the nearest rank; NaN of nothing.

@@ -17,8 +17,8 @@ pub struct Service {
     _directory: tempfile::TempDir,
     /// Meshes to ask with.
     pub queries: Vec<Vec<u8>>,
-    /// A mesh that takes seconds.
-    pub large: Vec<u8>,
+    /// Scans to leave in the middle of, by their number of vertices.
+    pub scans: Vec<(usize, Vec<u8>)>,
 }
 
 impl Service {
@@ -48,7 +48,7 @@ impl Service {
             port,
             _directory: directory,
             queries: Vec::new(),
-            large: Vec::new(),
+            scans: Vec::new(),
         };
         service.wait_for("/readyz", |status, _| status == 200);
         let options = ZooOptions::default();
@@ -67,7 +67,7 @@ impl Service {
             let (status, answer) = service.post(&path, "model/obj", &bytes);
             assert_eq!(status, 201, "{answer}");
         }
-        service.large = sphere(400);
+        service.scans = [100, 200, 400].map(|side| (side * side, sphere(side))).into();
         service.reindex(1);
         service.wait_idle();
         service

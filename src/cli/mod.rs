@@ -147,5 +147,7 @@ fn dispatch(cli: &Cli) -> Result<(), CliError> {
 /// Logs of commands other than `serve`: warnings, unless the environment asks for more.
 fn quiet_logs() -> Result<(), CliError> {
     let filter = std::env::var("SHAPELEX_LOG").unwrap_or_else(|_| "warn".to_owned());
-    telemetry::init(&filter, LogFormat::Text).map_err(|error| CliError::Usage(error.to_string()))
+    telemetry::init(&filter, LogFormat::Text, None)
+        .map(drop)
+        .map_err(|error| CliError::Usage(error.to_string()))
 }

@@ -33,7 +33,9 @@ pub fn run(args: &ServeArgs, json: bool) -> Result<(), CliError> {
         .or(file)
         .resolve()
         .map_err(|error| usage(&error))?;
-    telemetry::init(&config.log, config.log_format).map_err(|error| usage(&error))?;
+    let collector = Some(config.otlp_endpoint.as_str()).filter(|endpoint| !endpoint.is_empty());
+    let _export =
+        telemetry::init(&config.log, config.log_format, collector).map_err(|error| usage(&error))?;
     telemetry::log_panics();
     tracing::info!(
         version = env!("CARGO_PKG_VERSION"),

@@ -12,6 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
+use tracing::{Instrument, info_span};
 
 /// How the pool is sized.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,7 +93,7 @@ impl Compute {
         work: impl FnOnce(&Work) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         let asked = Instant::now();
-        let place = self.place(patience).await?;
+        let place = self.place(patience).instrument(info_span!("wait")).await?;
         let cancel = Cancel::new();
         let stop_on_drop = CancelOnDrop(cancel.clone());
         let surroundings = Work {

@@ -16,7 +16,7 @@ use crate::mesh::TriangleSoup;
 use crate::model::ClassId;
 use crate::parameters::Parameters;
 use crate::pipeline::prepared::OPEN_ABOVE;
-use crate::pipeline::{Stage, describe_query, describe_shape, rank, rank_top};
+use crate::pipeline::{Stage, StageSpan, describe_query, describe_shape, rank, rank_top};
 use crate::ranking::Index;
 use crate::spectral;
 use crate::store::StoreError;
@@ -205,10 +205,12 @@ fn timings(stages: &[(Stage, Duration)], waited: Duration, total: Duration) -> B
 struct Stopwatch {
     running: RefCell<Option<(Stage, Instant)>>,
     sums: RefCell<BTreeMap<Stage, Duration>>,
+    span: StageSpan,
 }
 
 impl Stopwatch {
     fn begin(&self, stage: Stage) {
+        self.span.begin(stage);
         let before = self.running.replace(Some((stage, Instant::now())));
         self.add(before);
     }

@@ -4,6 +4,7 @@
 //! a declared size is never believed.
 
 use super::problem::{Code, Problem};
+use std::cell::Cell;
 use std::io::{Cursor, Read};
 
 /// What an archive may hold at most.
@@ -93,19 +94,51 @@ fn unpack_zip(bytes: &[u8], limits: &ArchiveLimits) -> Result<Vec<Member>, Probl
     Ok(collected.members)
 }
 
+/// Bytes one member of a tar may have before its contents: its header, and names and attributes too long for that.
+const MAX_TAR_HEADERS: u64 = 1 << 20;
+
+/// Reads no more than it has been given; the rest of the archive is there for the next who gives.
+struct Rationed<'a, R> {
+    reader: R,
+    left: &'a Cell<u64>,
+}
+
+impl<R: Read> Read for Rationed<'_, R> {
+    fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
+        let most = usize::try_from(self.left.get())
+            .unwrap_or(usize::MAX)
+            .min(into.len());
+        if most == 0 && !into.is_empty() {
+            return Err(std::io::Error::other(format!(
+                "a member has more than {MAX_TAR_HEADERS} bytes of names and attributes"
+            )));
+        }
+        let read = self.reader.read(&mut into[..most])?;
+        self.left.set(self.left.get() - read as u64);
+        Ok(read)
+    }
+}
+
 fn unpack_tar(reader: impl Read, limits: &ArchiveLimits) -> Result<Vec<Member>, Problem> {
-    let mut archive = tar::Archive::new(reader);
+    let left = Cell::new(MAX_TAR_HEADERS);
+    let mut archive = tar::Archive::new(Rationed { reader, left: &left });
     let mut collected = Collector::new(limits);
     for entry in archive.entries().map_err(|e| broken("tar", e))? {
-        let entry = entry.map_err(|e| broken("tar", e))?;
+        let mut entry = entry.map_err(|e| broken("tar", e))?;
+        // The contents have limits of their own.
+        left.set(u64::MAX);
         if entry.header().entry_type().is_file() {
             let path = String::from_utf8_lossy(&entry.path_bytes()).into_owned();
             let declared = entry.size();
-            collected.take(&path, declared, entry)?;
+            collected.take(&path, declared, &mut entry)?;
         } else {
             collected.count()?;
         }
+        // What was not taken is passed over here, since the next entry would do so at the expense of its own headers.
+        std::io::copy(&mut entry, &mut std::io::sink()).map_err(|e| broken("tar", e))?;
+        left.set(MAX_TAR_HEADERS);
     }
+    left.set(u64::MAX);
     // The entries end before the stream does; what follows may be where a compressed one turns out to be cut short.
     std::io::copy(&mut archive.into_inner(), &mut std::io::sink()).map_err(|e| broken("tar", e))?;
     Ok(collected.members)
@@ -197,8 +230,11 @@ impl<'a> Collector<'a> {
     }
 }
 
-/// The path with forward slashes and without `.` parts. Absolute paths, drive letters, `..` and control characters
-/// are refused: no honest archive of meshes has them.
+/// Longest path of a member, in bytes; no file system takes a longer one.
+const MAX_PATH: usize = 4096;
+
+/// The path with forward slashes and without `.` parts. Absolute paths, drive letters, `..`, control characters and
+/// endless names are refused: no honest archive of meshes has them.
 fn safe_path(path: &str) -> Result<String, Problem> {
     let unsafe_path = || {
         Problem::new(
@@ -209,6 +245,9 @@ fn safe_path(path: &str) -> Result<String, Problem> {
             ),
         )
     };
+    if path.len() > MAX_PATH {
+        return Err(unsafe_path());
+    }
     let path = path.replace('\\', "/");
     let drive = path.as_bytes().get(1) == Some(&b':') && path.as_bytes()[0].is_ascii_alphabetic();
     if path.starts_with('/') || drive || path.chars().any(char::is_control) {

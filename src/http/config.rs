@@ -38,6 +38,8 @@ pub struct ServiceConfig {
     pub slow_query: Option<Duration>,
     /// Where it keeps everything.
     pub data_dir: PathBuf,
+    /// Whether only the catalogue is served and nothing is changed.
+    pub recovery_mode: bool,
     /// How the store is opened.
     pub store: StoreOptions,
     /// Longest request body, in bytes.
@@ -95,6 +97,7 @@ impl Default for ServiceConfig {
             key_limits: KeyLimits::default(),
             slow_query: None,
             data_dir: PathBuf::from("shapelex-data"),
+            recovery_mode: false,
             store: StoreOptions::default(),
             max_body_bytes: 128 << 20,
             max_upload_files: 2048,

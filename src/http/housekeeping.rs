@@ -44,7 +44,7 @@ fn recover(parts: &Parts) {
         }
         Err(StoreError::Full { detail }) => tracing::debug!(detail, "the disk is still full"),
         // A start afresh is the way out; readiness says so.
-        Err(StoreError::ReadOnly { .. }) => {}
+        Err(StoreError::ReadOnly { .. } | StoreError::RecoveryMode { .. }) => {}
         Err(error) => tracing::error!(%error, "the store does not recover"),
     }
 }
@@ -54,6 +54,9 @@ fn follow_schedule(parts: &Parts) -> bool {
     let Some(every) = parts.config.snapshot_every else {
         return true;
     };
+    if parts.store.recovery_mode().is_some() {
+        return true;
+    }
     let made = due(parts, every).and_then(|due| {
         if due {
             let snapshot = parts.store.create_snapshot(SnapshotOrigin::Scheduled)?;

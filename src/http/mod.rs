@@ -20,6 +20,7 @@ pub mod openapi;
 pub mod problem;
 mod problem_from;
 mod ranked;
+mod recovery_mode;
 pub mod respond;
 pub mod router;
 mod routes;

@@ -250,7 +250,13 @@ fn problems_of(operation: &str) -> Vec<Code> {
             UPLOAD,
             MESH,
             POOL,
-            &[OneMeshExpected, IndexEmpty, IndexIncomplete, RateLimited],
+            &[
+                OneMeshExpected,
+                IndexEmpty,
+                IndexIncomplete,
+                RecoveryMode,
+                RateLimited,
+            ],
         ]
         .concat(),
         "create_snapshot" => [WRITE, &[SnapshotRunning]].concat(),
@@ -263,7 +269,7 @@ fn problems_of(operation: &str) -> Vec<Code> {
             &[EmptyBody, InvalidRequest, RequestTimeout, BodyTooLarge],
         ]
         .concat(),
-        "query_batch" => [UPLOAD, &[IndexEmpty, RateLimited]].concat(),
+        "query_batch" => [UPLOAD, &[IndexEmpty, RecoveryMode, RateLimited]].concat(),
         _ => vec![],
     };
     if access_of(operation) != Access::Public {
@@ -280,7 +286,7 @@ const JSON: &[Code] = &[
     Code::BodyTooLarge,
     Code::UnsupportedMediaType,
 ];
-const WRITE: &[Code] = &[Code::StoreUnavailable, Code::StorageFull];
+const WRITE: &[Code] = &[Code::StoreUnavailable, Code::RecoveryMode, Code::StorageFull];
 const RESTORE: &[Code] = &[
     Code::SnapshotRunning,
     Code::InvalidSnapshot,

@@ -112,6 +112,7 @@ codes! {
     ShuttingDown, "shutting_down", 503, "The service is shutting down";
     NotReady, "not_ready", 503, "The service is not ready";
     StoreUnavailable, "store_unavailable", 503, "The store does not accept this now";
+    RecoveryMode, "recovery_mode", 503, "The service only shows the catalogue and changes nothing";
     StorageFull, "storage_full", 507, "There is no space left";
     Cancelled, "cancelled", 503, "The work was stopped before it had a result";
     DeadlineExceeded, "deadline_exceeded", 504, "The answer took longer than the time limit";

@@ -43,6 +43,7 @@ impl From<MeshError> for Problem {
                 .with("found", found)
                 .with("limit", limit),
             MeshError::NoAnimation => of(Code::NoAnimation),
+            MeshError::Cancelled(_) => of(Code::Cancelled),
             MeshError::Invalid { .. } => of(Code::InvalidMesh),
         }
     }
@@ -118,6 +119,15 @@ pub fn index_empty() -> Problem {
     .with("next", "/v1/reindex")
 }
 
+/// The service shows the catalogue only: says where it says why.
+pub fn recovery_mode() -> Problem {
+    Problem::new(
+        Code::RecoveryMode,
+        "the service is in recovery mode: it shows the catalogue and changes nothing; /readyz and the log say why",
+    )
+    .with("retry_after_seconds", 30)
+}
+
 /// The index knows nothing for the baselines: says what to do next.
 pub fn baselines_missing(rank_by: &str) -> Problem {
     Problem::new(
@@ -165,6 +175,7 @@ impl From<StoreError> for Problem {
             )
             .with("retry_after_seconds", 30)
             .logged(detail),
+            StoreError::RecoveryMode { .. } => recovery_mode(),
             StoreError::Damaged { .. } => Self::new(
                 Code::Internal,
                 "a stored record is damaged; the log has it under this request id",

@@ -5,7 +5,7 @@ use super::auth::{Access, access_of, authorize};
 use super::metrics;
 use super::problem::{Code, Problem};
 use super::state::AppState;
-use super::trace_context::trace_parent;
+use super::trace_context::{self, trace_parent};
 use crate::model::Scope;
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
@@ -39,12 +39,15 @@ pub async fn around(State(state): State<AppState>, mut request: Request, next: N
         Some(_) => access_of(operation),
     };
     let span = tracing::info_span!(
-        "request", request_id = %id, operation, %method, path, key = Empty, trace_id = Empty, parent_span = Empty
+        "request", request_id = %id, operation, %method, path, key = Empty, trace_id = Empty, parent_span = Empty,
+        otel.name = Empty, otel.kind = Empty
     );
-    if let Some(parent) = trace_parent(request.headers()) {
+    let parent = trace_parent(request.headers());
+    if let Some(parent) = parent {
         span.record("trace_id", parent.trace);
         span.record("parent_span", parent.span);
     }
+    trace_context::begin(&span, parent, operation);
     let began = Instant::now();
     let (caller, allowed) = authorize(&state, request.headers(), access);
     let allowed = allowed.and_then(|()| check_length(&request));
@@ -66,6 +69,7 @@ pub async fn around(State(state): State<AppState>, mut request: Request, next: N
         let entry = Entry::new(&id, &caller, operation, &path, status.as_u16(), outcome);
         state.audit.write(&entry);
     }
+    trace_context::end(&span, status, outcome);
     metrics::count_request(operation, status.as_u16(), took);
     let milliseconds = took.as_secs_f64() * 1e3;
     span.in_scope(|| {

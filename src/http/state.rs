@@ -8,7 +8,7 @@ use super::keyring::Keyring;
 use super::limits::Limits;
 use super::memory::MemoryBudget;
 use super::problem::Problem;
-use super::{metrics, openapi};
+use super::{metrics, openapi, recovery_mode};
 use crate::jobs::{JobError, Jobs};
 use crate::store::{Health, Store, StoreError};
 use std::net::SocketAddr;
@@ -126,7 +126,17 @@ impl AppState {
             });
         }
         let audit = Audit::open(&config.data_dir).map_err(OpenError::Audit)?;
-        let jobs = Jobs::start(store.clone(), config.job_options())?;
+        if let Some(why) = recovery_mode::reason(&config, &store) {
+            store.enter_recovery_mode(why);
+        }
+        let jobs = match Jobs::start(store.clone(), config.job_options()) {
+            // The catalogue is there, or the store had not opened: better that than nothing.
+            Err(JobError::Store(error)) if store.recovery_mode().is_none() => {
+                store.enter_recovery_mode(format!("the index and the jobs could not be read: {error}"));
+                Jobs::start(store.clone(), config.job_options())?
+            }
+            other => other?,
+        };
         let compute = Compute::new(ComputeOptions {
             threads: config.query_threads,
             queue: config.query_queue,
@@ -161,7 +171,11 @@ impl AppState {
         work: impl FnOnce(&Parts) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         let state = self.clone();
-        let span = tracing::Span::current();
+        // Housekeeping, which no request asks for, is no trace.
+        let span = match tracing::Span::current() {
+            none if none.is_none() => none,
+            _ => tracing::info_span!("store"),
+        };
         match tokio::task::spawn_blocking(move || span.in_scope(|| work(&state))).await {
             Ok(result) => result,
             Err(error) => {
@@ -175,6 +189,7 @@ impl AppState {
     pub fn readiness(&self) -> Readiness {
         let store = match self.store.health() {
             Health::Ready => None,
+            Health::ReadOnly { why } if self.store.recovery_mode().is_some() => Some(why),
             Health::ReadOnly { why } => Some(format!("read-only since a write failed: {why}")),
         };
         let worker = (!self.jobs.is_running()).then(|| "the indexing worker is not running".to_owned());

@@ -10,6 +10,7 @@ use bytes::BytesMut;
 use futures_util::StreamExt;
 use std::sync::Arc;
 use std::time::Duration;
+use tracing::{Instrument, info_span};
 
 /// What an upload may hold at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +50,8 @@ pub async fn receive(
             Ok(vec![receive_raw(request, declared, name, &limits).await?])
         }
     };
-    let parts = tokio::time::timeout(time_limit, receiving).await.map_err(|_| {
+    let received = tokio::time::timeout(time_limit, receiving).instrument(info_span!("receive"));
+    let parts = received.await.map_err(|_| {
         let seconds = time_limit.as_secs_f64();
         Problem::new(
             Code::RequestTimeout,
@@ -58,7 +60,8 @@ pub async fn receive(
         .with("limit_seconds", seconds)
     })??;
     // Unpacking is neither quick nor numeric: off tokio's threads, but not in a query's way either.
-    tokio::task::spawn_blocking(move || sort(parts, &limits))
+    let span = info_span!("unpack");
+    tokio::task::spawn_blocking(move || span.in_scope(|| sort(parts, &limits)))
         .await
         .map_err(Problem::internal)?
 }

@@ -6,7 +6,7 @@ use crate::cancel::Cancel;
 use crate::mesh::{self, Companion, Format, Limits, Source, TriangleSoup};
 use crate::model::{ContentHash, FailedShape, Shape};
 use crate::parameters::Parameters;
-use crate::pipeline::{Description, PipelineError, describe_shape};
+use crate::pipeline::{Description, PipelineError, StageSpan, describe_shape};
 use crate::store::Store;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -92,6 +92,8 @@ impl Describer<'_> {
             }
             let soups = guarded(|| self.read(&missing));
             missing.par_iter().enumerate().for_each(|(i, shape)| {
+                let _span =
+                    tracing::info_span!(parent: progress.step(), "describe", shape = %shape.id).entered();
                 let described = match &soups {
                     Ok(soups) => guarded(|| self.describe(shape, soups[i].clone())),
                     Err(failure) => Err(failure.clone()),
@@ -132,7 +134,9 @@ impl Describer<'_> {
     }
 
     fn describe(&self, shape: &Shape, soup: TriangleSoup) -> Result<Description, Failure> {
-        let description = describe_shape(soup, self.parameters, self.cancel, &|_| {})?;
+        let stages = StageSpan::default();
+        let description = describe_shape(soup, self.parameters, self.cancel, &|stage| stages.begin(stage))?;
+        drop(stages);
         let kept = self
             .store
             .put_signatures(shape.identity(), &self.fingerprint, &description);

@@ -70,13 +70,25 @@ pub(super) fn load(store: &Store) -> Result<(LiveIndex, bool), StoreError> {
         Err(other) => return Err(other),
     };
     let live = LiveIndex {
-        generation: None,
         index: Index {
             parameters: store.parameters()?,
             classes: Vec::new(),
         },
-        baselines: None,
-        calibration: None,
+        ..empty(store)
     };
     Ok((live, lost))
+}
+
+/// No index, where there may well be one that is not to be loaded.
+pub(super) fn empty(store: &Store) -> LiveIndex {
+    LiveIndex {
+        generation: None,
+        index: Index {
+            // What was asked for last is only a hint while nothing is indexed.
+            parameters: store.parameters().unwrap_or_default(),
+            classes: Vec::new(),
+        },
+        baselines: None,
+        calibration: None,
+    }
 }

@@ -10,6 +10,7 @@ mod exclusive;
 mod failure;
 mod live;
 mod plan;
+mod priority;
 mod progress;
 mod reindex;
 mod worker;
@@ -159,7 +160,8 @@ impl Inner {
 
 impl Jobs {
     /// Loads the live index, queues interrupted jobs again and starts the worker. An index that was lost, or cannot be
-    /// loaded, is queued to be learnt again; queries find it empty until then.
+    /// loaded, is queued to be learnt again; queries find it empty until then. In recovery mode nothing is loaded and
+    /// nothing runs.
     ///
     /// # Errors
     /// [`JobError::Store`] where the jobs cannot be read, [`JobError::NoWorker`] where no thread can be started.
@@ -168,9 +170,15 @@ impl Jobs {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(options.indexing_threads.max(1))
             .thread_name(|i| format!("indexing-{i}"))
+            .start_handler(|_| priority::give_way())
             .build()
             .map_err(|e| no_worker(e.to_string()))?;
-        let (live, lost) = live::load(&store)?;
+        let idle = store.recovery_mode().is_some();
+        let (live, lost) = if idle {
+            (live::empty(&store), false)
+        } else {
+            live::load(&store)?
+        };
         let inner = Arc::new(Inner {
             store,
             options,
@@ -181,7 +189,9 @@ impl Jobs {
             depth: AtomicUsize::new(0),
             worker: Mutex::default(),
         });
-        worker::requeue_interrupted(&inner)?;
+        if !idle {
+            worker::requeue_interrupted(&inner)?;
+        }
         let for_worker = Arc::clone(&inner);
         let worker = std::thread::Builder::new()
             .name("jobs".to_owned())

@@ -2,9 +2,10 @@
 
 use crate::model::{Job, Step};
 use crate::store::Store;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
+use tracing::Span;
 
 const WRITE_EVERY: Duration = Duration::from_millis(500);
 
@@ -13,19 +14,32 @@ pub(super) struct Progress {
     store: Store,
     channel: watch::Sender<Job>,
     written: Mutex<Instant>,
+    /// The job's span, and that of the step that began last.
+    job: Span,
+    step: Mutex<Span>,
 }
 
 impl Progress {
+    /// Of the job whose span this is called in.
     pub(super) fn new(store: Store, channel: watch::Sender<Job>) -> Self {
         Self {
             store,
             channel,
             written: Mutex::new(Instant::now()),
+            job: Span::current(),
+            step: Mutex::new(Span::none()),
         }
+    }
+
+    /// The span of the step that began last. The threads of the pool know no other way where they are.
+    pub(super) fn step(&self) -> Span {
+        self.step.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Begins a step.
     pub(super) fn begin(&self, name: &str, total: usize) {
+        *self.step.lock().unwrap_or_else(PoisonError::into_inner) =
+            tracing::info_span!(parent: &self.job, "step", name);
         self.channel.send_modify(|job| {
             job.steps.push(Step {
                 name: name.to_owned(),

@@ -172,6 +172,8 @@ fn learn_class(
     mut failed: Vec<FailedShape>,
 ) -> Result<Learnt, ReindexError> {
     stop_if_cancelled(request)?;
+    let _span =
+        tracing::info_span!(parent: request.progress.step(), "learn", class = %class.class.id).entered();
     let parameters = describer.parameters;
     let (id, name) = (class.class.id, class.class.name.as_str());
     let mut descriptions: Vec<(&Shape, Description)> = Vec::new();

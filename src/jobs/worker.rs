@@ -52,15 +52,17 @@ pub(super) fn requeue_interrupted(inner: &Inner) -> Result<(), JobError> {
 pub(super) fn run(inner: &Arc<Inner>) {
     let _end = Stopped(inner);
     while let Some((id, channel, cancel)) = next(inner) {
-        let ended =
-            catch_unwind(AssertUnwindSafe(|| work(inner, &channel, &cancel))).unwrap_or_else(|panic| {
-                let text = panic_text(panic.as_ref());
-                tracing::error!(job = %id, text, "a job panicked");
-                Err(ReindexError::failed(
-                    "internal",
-                    format!("a defect in shapelex: {text}"),
-                ))
-            });
+        let ended = catch_unwind(AssertUnwindSafe(|| {
+            tracing::info_span!("job", job = %id).in_scope(|| work(inner, &channel, &cancel))
+        }))
+        .unwrap_or_else(|panic| {
+            let text = panic_text(panic.as_ref());
+            tracing::error!(job = %id, text, "a job panicked");
+            Err(ReindexError::failed(
+                "internal",
+                format!("a defect in shapelex: {text}"),
+            ))
+        });
         finish(inner, id, &channel, ended);
     }
 }

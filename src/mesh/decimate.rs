@@ -4,6 +4,7 @@ use super::clean::{Cleaned, clean_again, drop_unreferenced};
 use super::locality::order_along_curve;
 use super::orient::orient;
 use super::{Components, MeshError};
+use crate::cancel::{Cancel, Cancelled};
 use meshopt::{SimplifyOptions, simplify_decoder, simplify_sloppy_decoder};
 
 /// How a mesh came to its working size.
@@ -42,23 +43,27 @@ const ANY_ERROR: f32 = 1e3;
 /// loses 1–1.5 % of the area. The result is cleaned again. A mesh whose neighbouring faces do not all run
 /// the same way (not `oriented`) is oriented first.
 ///
-/// Errors: [`MeshError::Degenerate`] when nothing with an area is left.
+/// Errors: [`MeshError::Degenerate`] when nothing with an area is left; [`MeshError::Cancelled`].
 pub(super) fn simplify_to(
     mesh: &mut Cleaned,
     working_size: usize,
     keep: Components,
     oriented: bool,
+    cancel: &Cancel,
 ) -> Result<Simplified, MeshError> {
     if working_size == 0 || mesh.vertices.len() <= working_size {
         return Ok(Simplified::No);
     }
+    cancel.check()?;
     // Fewer than four vertices are not a mesh.
     let size = working_size.max(4);
     if mesh.vertices.len() > OUT_OF_CACHE {
         order_along_curve(&mut mesh.vertices, &mut mesh.faces);
+        cancel.check()?;
     }
     if !oriented {
         orient(mesh.vertices.len(), &mut mesh.faces);
+        cancel.check()?;
     }
     let steps = [
         (SimplifyOptions::RegularizeLight, Simplified::ByCollapse),
@@ -68,7 +73,7 @@ pub(super) fn simplify_to(
         ),
     ];
     for (options, outcome) in steps {
-        collapse(mesh, size, options);
+        collapse(mesh, size, options, cancel)?;
         clean_again(mesh, keep)?;
         if mesh.vertices.len() <= size {
             return Ok(outcome);
@@ -84,13 +89,19 @@ pub(super) fn simplify_to(
 /// The library counts faces, we count vertices. A collapse inside takes two faces with its vertex, one on a border a
 /// single face, and how many of each there will be is not known. So the first round, which does the work, aims a
 /// tenth above the size, and the later ones approach it with the measured faces per vertex.
-fn collapse(mesh: &mut Cleaned, size: usize, options: SimplifyOptions) {
+fn collapse(
+    mesh: &mut Cleaned,
+    size: usize,
+    options: SimplifyOptions,
+    cancel: &Cancel,
+) -> Result<(), Cancelled> {
     let mut faces_per_vertex = 2.0;
     for round in 0..ROUNDS {
         let (v, f) = (mesh.vertices.len(), mesh.faces.len());
         if v <= size {
-            return;
+            return Ok(());
         }
+        cancel.check()?;
         let excess = (v - size) as f64;
         let coarse = MARGIN * size as f64 * (f as f64 / v as f64).max(2.0);
         let target = if round == 0 && coarse < f as f64 {
@@ -110,10 +121,11 @@ fn collapse(mesh: &mut Cleaned, size: usize, options: SimplifyOptions) {
         adopt(mesh, &result);
         let removed = v - mesh.vertices.len();
         if removed == 0 {
-            return;
+            return Ok(());
         }
         faces_per_vertex = ((f - mesh.faces.len()) as f64 / removed as f64).clamp(1.0, 2.0);
     }
+    Ok(())
 }
 
 /// Vertex clustering, with fewer faces each time until the size is met.

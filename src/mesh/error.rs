@@ -1,6 +1,7 @@
 //! Why bytes did not become a mesh. Every variant is one stable problem code of the API.
 
 use super::Format;
+use crate::cancel::Cancelled;
 
 /// Why a file could not be read or a mesh could not be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -56,6 +57,9 @@ pub enum MeshError {
     /// Poses were asked of a file that has no animation.
     #[error("poses were asked for, but the file has no animation")]
     NoAnimation,
+    /// The caller asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// A [`TriMesh`](super::TriMesh) was built from arrays that break its invariants.
     #[error("invalid mesh: {detail}")]
     Invalid { detail: String },

@@ -28,7 +28,7 @@ pub mod whiten;
 pub use detect::Format;
 pub use error::MeshError;
 pub use limits::Limits;
-pub use prepare::{Components, PrepareOptions, PrepareReport, prepare};
+pub use prepare::{Components, PrepareOptions, PrepareReport, prepare, prepare_until};
 pub use read::{Companion, Pose, Source, read, read_poses};
 pub use soup::TriangleSoup;
 pub use trimesh::TriMesh;

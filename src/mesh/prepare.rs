@@ -6,6 +6,7 @@ use super::decimate::{Simplified, simplify_to};
 use super::edges::edge_census;
 use super::holes::fill_small_holes;
 use super::{MeshError, TriMesh, TriangleSoup};
+use crate::cancel::Cancel;
 use serde::{Deserialize, Serialize};
 
 /// Boundary length / √area above which a surface counts as open (a half sphere has 2.507).
@@ -104,14 +105,33 @@ pub struct PrepareReport {
 /// soups that break their promise, [`MeshError::Degenerate`] when no face has an area, [`MeshError::TooSmall`] when
 /// fewer than 4 vertices or 2 faces are left.
 pub fn prepare(soup: TriangleSoup, options: &PrepareOptions) -> Result<(TriMesh, PrepareReport), MeshError> {
+    prepare_until(soup, options, &Cancel::new())
+}
+
+/// As [`prepare`], for a caller that may ask to stop. The flag is looked at between the steps; of these, one round of
+/// collapses of a large mesh takes the longest.
+///
+/// Errors: those of [`prepare`], and [`MeshError::Cancelled`].
+pub fn prepare_until(
+    soup: TriangleSoup,
+    options: &PrepareOptions,
+    cancel: &Cancel,
+) -> Result<(TriMesh, PrepareReport), MeshError> {
     let mut report = PrepareReport::default();
     let mut mesh = clean(soup, options.components, &mut report)?;
+    cancel.check()?;
     let mut census = edge_census(mesh.vertices.len(), &mesh.faces);
     report.non_manifold_edges = census.non_manifold;
 
     let before = mesh.vertices.len();
     let oriented = census.inconsistent == 0;
-    let simplified = simplify_to(&mut mesh, options.working_size, options.components, oriented)?;
+    let simplified = simplify_to(
+        &mut mesh,
+        options.working_size,
+        options.components,
+        oriented,
+        cancel,
+    )?;
     if simplified != Simplified::No {
         report.simplified_from = Some(before);
         census = edge_census(mesh.vertices.len(), &mesh.faces);

@@ -15,7 +15,7 @@ pub enum PipelineError {
     Cancelled(Cancelled),
     /// The bytes are no usable mesh.
     #[error(transparent)]
-    Mesh(#[from] MeshError),
+    Mesh(MeshError),
     /// The mesh has no usable spectrum.
     #[error(transparent)]
     Spectral(SpectralError),
@@ -33,6 +33,15 @@ pub enum PipelineError {
 impl From<Cancelled> for PipelineError {
     fn from(error: Cancelled) -> Self {
         Self::Cancelled(error)
+    }
+}
+
+impl From<MeshError> for PipelineError {
+    fn from(error: MeshError) -> Self {
+        match error {
+            MeshError::Cancelled(c) => Self::Cancelled(c),
+            other => Self::Mesh(other),
+        }
     }
 }
 

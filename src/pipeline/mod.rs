@@ -15,4 +15,4 @@ pub use error::PipelineError;
 pub use held_out::held_out_scores;
 pub use learn::{Model, ModelReport, learn_model};
 pub use prepared::PreparedShape;
-pub use stage::Stage;
+pub use stage::{Stage, StageSpan};

@@ -4,7 +4,7 @@ use super::{Description, PipelineError, Stage};
 use crate::cancel::Cancel;
 use crate::mesh::boundary::boundary_vertices;
 use crate::mesh::whiten::whiten;
-use crate::mesh::{PrepareReport, TriMesh, TriangleSoup, prepare};
+use crate::mesh::{PrepareReport, TriMesh, TriangleSoup, prepare_until};
 use crate::parameters::{Channel, Hypothesis, Parameters};
 use crate::ranking::View;
 use crate::signature::describe_vertices;
@@ -56,7 +56,7 @@ impl PreparedShape {
         observer: &dyn Fn(Stage),
     ) -> Result<Self, PipelineError> {
         observer(Stage::Prepare);
-        let (mesh, report) = prepare(soup, &parameters.prepare_options())?;
+        let (mesh, report) = prepare_until(soup, &parameters.prepare_options(), cancel)?;
         cancel.check()?;
         observer(Stage::Laplacian);
         let operators = assemble(&mesh)?;

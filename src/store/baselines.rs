@@ -26,7 +26,7 @@ struct ModelV1 {
 }
 
 /// A model as a record.
-struct ModelRecord(BaselineModel);
+pub(super) struct ModelRecord(BaselineModel);
 
 impl Record for ModelRecord {
     const FAMILY: Family = Family::BaselineModel;
@@ -72,7 +72,7 @@ struct ShapeV1 {
 }
 
 /// A class's shapes as a record; labels are identifiers as text.
-struct ShapesRecord(Vec<BaselineShape>);
+pub(super) struct ShapesRecord(Vec<BaselineShape>);
 
 impl Record for ShapesRecord {
     const FAMILY: Family = Family::Baselines;

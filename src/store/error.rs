@@ -79,6 +79,12 @@ pub enum StoreError {
         /// The failure.
         why: String,
     },
+    /// The store is only to be looked at. Nothing is written.
+    #[error("recovery mode, nothing is changed: {why}")]
+    RecoveryMode {
+        /// Why it is.
+        why: String,
+    },
     /// A record or file is not what was written.
     #[error("{what} is damaged: {detail}")]
     Damaged {

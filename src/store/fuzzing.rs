@@ -1,10 +1,12 @@
 //! The record decoders under one roof, for the fuzz target `record`.
 
+use super::baselines::{ModelRecord, ShapesRecord};
 use super::catalogue_log::LineIn;
 use super::dictionaries::DictionaryRecord;
+use super::idempotency::Remembered;
 use super::payload::{Link, Number};
 use super::record::{Record, check as check_envelope, seal, unseal};
-use crate::model::{Class, Generation, Job, Shape};
+use crate::model::{ApiKey, Class, Generation, Job, Shape};
 use crate::parameters::Parameters;
 use crate::pipeline::Description;
 
@@ -20,7 +22,7 @@ pub fn check(bytes: &[u8]) {
         return;
     };
     let version = u16::from(*version);
-    match family % 10 {
+    match family % 14 {
         0 => decode::<Number>(version, payload),
         1 => decode::<Parameters>(version, payload),
         2 => decode::<Link<3>>(version, payload),
@@ -31,7 +33,11 @@ pub fn check(bytes: &[u8]) {
         7 => decode::<Generation>(version, payload),
         8 => decode::<Job>(version, payload),
         // The text behind a line's checksum.
-        _ => drop(serde_json::from_slice::<LineIn>(payload)),
+        9 => drop(serde_json::from_slice::<LineIn>(payload)),
+        10 => decode::<ModelRecord>(version, payload),
+        11 => decode::<ShapesRecord>(version, payload),
+        12 => decode::<ApiKey>(version, payload),
+        _ => decode::<Remembered>(version, payload),
     }
 }
 

@@ -144,7 +144,7 @@ impl Inner {
     fn writable(&self) -> Result<(), StoreError> {
         match &*self.failure() {
             None => Ok(()),
-            Some(full @ StoreError::Full { .. }) => Err(full.clone()),
+            Some(known @ (StoreError::Full { .. } | StoreError::RecoveryMode { .. })) => Err(known.clone()),
             Some(other) => Err(StoreError::ReadOnly {
                 why: other.to_string(),
             }),
@@ -214,6 +214,23 @@ impl Store {
         match &*self.inner.failure() {
             None => Health::Ready,
             Some(why) => Health::ReadOnly { why: why.to_string() },
+        }
+    }
+
+    /// Takes no writes from now on, so that what is there can be looked at and nothing happens to it.
+    pub fn enter_recovery_mode(&self, why: String) {
+        tracing::error!(
+            why,
+            "recovery mode: the catalogue is served, and nothing is changed"
+        );
+        *self.inner.failure() = Some(StoreError::RecoveryMode { why });
+    }
+
+    /// Why the store is in recovery mode; `None` where it is not.
+    pub fn recovery_mode(&self) -> Option<String> {
+        match &*self.inner.failure() {
+            Some(StoreError::RecoveryMode { why }) => Some(why.clone()),
+            _ => None,
         }
     }
 

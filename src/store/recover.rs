@@ -37,7 +37,8 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Full`] where there is no space yet; [`StoreError::ReadOnly`] after any other failure, since what
-    /// the system holds in memory may not be what the disk holds, and only a start afresh tells; a failure of opening.
+    /// the system holds in memory may not be what the disk holds, and only a start afresh tells;
+    /// [`StoreError::RecoveryMode`], which only ends with the process; a failure of opening.
     pub fn recover(&self) -> Result<(), StoreError> {
         match self.inner.writable() {
             Ok(()) => return Ok(()),

@@ -12,6 +12,7 @@ mod memory;
 mod model;
 mod process;
 mod restores;
+mod upgrades;
 
 /// A bumpy torus as OFF text; every seed gives another one, so that no two uploads are the same file.
 pub fn mesh(seed: u32) -> String {

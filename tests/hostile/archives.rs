@@ -73,6 +73,33 @@ pub const CASES: &[fn() -> Case] = &[
     },
     || {
         (
+            "a name of 200 MB",
+            "application/gzip",
+            endless_name(tar::EntryType::GNULongName),
+            422,
+            "invalid_archive",
+        )
+    },
+    || {
+        (
+            "attributes of 200 MB",
+            "application/gzip",
+            endless_name(tar::EntryType::XHeader),
+            422,
+            "invalid_archive",
+        )
+    },
+    || {
+        (
+            "a name of 100 kB",
+            "application/x-tar",
+            long_name(),
+            422,
+            "unsafe_archive_path",
+        )
+    },
+    || {
+        (
             "a way out",
             "application/zip",
             zip_of("../../x.off"),
@@ -156,6 +183,33 @@ fn gzip_in_gzip() -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
     encoder.write_all(&gzip_bomb()).unwrap();
     encoder.finish().unwrap()
+}
+
+/// A member whose name comes in a member of its own before it, as the tar programs do where it is long.
+fn endless_name(kind: tar::EntryType) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder
+        .write_all(header("long", 200 << 20, kind).as_bytes())
+        .unwrap();
+    let letters = vec![b'a'; 1 << 20];
+    for _ in 0..200 {
+        encoder.write_all(&letters).unwrap();
+    }
+    encoder
+        .write_all(header("x.off", 0, tar::EntryType::Regular).as_bytes())
+        .unwrap();
+    encoder.write_all(&[0; 1024]).unwrap();
+    encoder.finish().unwrap()
+}
+
+fn long_name() -> Vec<u8> {
+    let mut builder = tar::Builder::new(Vec::new());
+    let mut header = tar::Header::new_gnu();
+    header.set_size(3);
+    header.set_mode(0o644);
+    let name = "a".repeat(100_000) + ".off";
+    builder.append_data(&mut header, name, b"OFF".as_slice()).unwrap();
+    builder.into_inner().unwrap()
 }
 
 fn million_folders() -> Vec<u8> {

@@ -162,6 +162,15 @@ pub const CASES: &[fn() -> Case] = &[
             "malformed_mesh",
         )
     },
+    || {
+        (
+            "glTF of numbers",
+            "model/gltf+json",
+            numbers(),
+            413,
+            "mesh_too_large",
+        )
+    },
     || ("3000 triangles", "model/off", triangles(), 422, "mesh_too_small"),
     || ("one place", "model/off", coincident(), 422, "degenerate_mesh"),
 ];
@@ -217,6 +226,13 @@ fn gltf(change: impl FnOnce(&mut Value)) -> Vec<u8> {
     });
     change(&mut document);
     document.to_string().into_bytes()
+}
+
+/// A list nobody needs, of five million numbers: some 50 bytes each once it is read.
+fn numbers() -> Vec<u8> {
+    let list = "0,".repeat(5_000_000) + "0";
+    let accessor = format!(r#"{{"componentType":5126,"count":1,"type":"VEC3","min":[{list}]}}"#);
+    format!(r#"{{"asset":{{"version":"2.0"}},"accessors":[{accessor}]}}"#).into_bytes()
 }
 
 fn nested() -> Vec<u8> {

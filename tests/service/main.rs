@@ -14,6 +14,7 @@ mod limits;
 mod meshes;
 mod operation;
 mod promises;
+mod recovery_mode;
 mod security;
 mod snapshots;
 mod uploads;

@@ -309,6 +309,24 @@ fn a_bomb_is_refused_before_it_goes_off() {
         matches!(refused, Some(StoreError::BadSnapshot { .. })),
         "{refused:?}"
     );
+    // A name without an end, which tar readers collect in memory: refused for its own name, and not read.
+    for kind in [tar::EntryType::GNULongName, tar::EntryType::XHeader] {
+        let mut encoder = zstd::Encoder::new(Vec::new(), 3).unwrap();
+        let mut header = tar::Header::new_ustar();
+        header.set_path("long").unwrap();
+        header.set_size(1 << 33);
+        header.set_entry_type(kind);
+        header.set_cksum();
+        encoder.write_all(header.as_bytes()).unwrap();
+        for _ in 0..64 {
+            encoder.write_all(&vec![b'a'; 1 << 20]).unwrap();
+        }
+        let refused = store.stage_snapshot(&encoder.finish().unwrap()[..], LIMIT).err();
+        assert!(
+            matches!(&refused, Some(StoreError::BadSnapshot { detail }) if detail.contains("it holds 'long'")),
+            "{refused:?}"
+        );
+    }
 }
 
 #[test]

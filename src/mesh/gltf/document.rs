@@ -11,6 +11,8 @@ use std::cell::{Cell, OnceCell};
 
 /// Most JSON objects in one document. Each becomes a few hundred bytes of structures, whatever its length in text.
 const MAX_OBJECTS: usize = 400_000;
+/// Most JSON values in one document, by its commas. A number of two bytes in a list becomes over thirty.
+const MAX_VALUES: usize = 4_000_000;
 
 /// Required extensions that change nothing about the surface, by prefix, and the one that we read.
 const HARMLESS: [&str; 9] = [
@@ -47,13 +49,14 @@ impl<'a> Document<'a> {
             _ => (source.bytes, None),
         };
         let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
-        let objects = json.iter().filter(|&&b| b == b'{').count();
-        if objects > MAX_OBJECTS {
-            return Err(MeshError::TooLarge {
-                what: "JSON objects",
-                found: objects,
-                limit: MAX_OBJECTS,
-            });
+        for (what, byte, limit) in [
+            ("JSON objects", b'{', MAX_OBJECTS),
+            ("JSON values", b',', MAX_VALUES),
+        ] {
+            let found = json.iter().filter(|&&b| b == byte).count();
+            if found > limit {
+                return Err(MeshError::TooLarge { what, found, limit });
+            }
         }
         let root: Root = gltf::json::deserialize::from_slice(json).map_err(|error| {
             if error.is_eof() {

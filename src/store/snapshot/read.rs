@@ -44,7 +44,9 @@ pub(super) fn unpack(
     let mut decoder = zstd::Decoder::new(archive).map_err(|e| bad(&e))?;
     decoder.window_log_max(WINDOW_LOG).map_err(|e| bad(&e))?;
     let mut archive = tar::Archive::new(decoder);
-    let mut entries = archive.entries().map_err(|e| bad(&e))?;
+    // Members as they are: no name of ours is long enough to come in a member before its own, which would be taken into
+    // memory whatever its length.
+    let mut entries = archive.entries().map_err(|e| bad(&e))?.raw(true);
     let manifest = read_manifest(&mut entries)?;
     if manifest.unpacked_bytes() > limit {
         return Err(StoreError::bad_snapshot(format!(

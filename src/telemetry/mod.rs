@@ -1,8 +1,14 @@
-//! Logs: to stderr, as text for people or as one JSON object per line for machines.
+//! Logs: to stderr, as text for people or as one JSON object per line for machines. Traces: to an OpenTelemetry
+//! collector, where one is named and the feature `otlp` was built in.
+
+#[cfg(feature = "otlp")]
+mod otlp;
 
 use serde::{Deserialize, Serialize};
 use std::io::IsTerminal;
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
+use tracing_subscriber::{EnvFilter, Layer, Registry};
 
 /// How log lines are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -29,24 +35,68 @@ pub enum TelemetryError {
     /// The process has a subscriber already.
     #[error("logging was set up twice")]
     AlreadySet,
+    /// This build cannot.
+    #[error("this shapelex was built without traces; build it with `--features otlp`")]
+    NotBuilt,
+    /// Traces cannot be sent there.
+    #[error("traces cannot be sent to {endpoint}: {reason}")]
+    Collector {
+        /// Where they were to go.
+        endpoint: String,
+        /// Why not.
+        reason: String,
+    },
 }
 
+/// Keeps traces going out. What has not been sent when it is dropped is sent then.
+#[derive(Default)]
+#[must_use = "traces end when this is dropped"]
+pub struct Export {
+    #[cfg(feature = "otlp")]
+    _traces: Option<otlp::Traces>,
+}
+
+type BoxedLayer = Box<dyn Layer<Registry> + Send + Sync>;
+
 /// Installs the process's log output. `filter` is a level (`error`, `warn`, `info`, `debug`, `trace`, `off`) or a list
-/// of `target=level`.
+/// of `target=level`. `collector` is the address of an OpenTelemetry collector that gets our spans, whatever the filter
+/// says about logs.
 ///
 /// # Errors
-/// [`TelemetryError::Filter`] for a filter that cannot be read; [`TelemetryError::AlreadySet`] on a second call.
-pub fn init(filter: &str, format: LogFormat) -> Result<(), TelemetryError> {
+/// [`TelemetryError::Filter`] for a filter that cannot be read; [`TelemetryError::AlreadySet`] on a second call;
+/// [`TelemetryError::NotBuilt`] and [`TelemetryError::Collector`] where traces cannot be sent.
+pub fn init(filter: &str, format: LogFormat, collector: Option<&str>) -> Result<Export, TelemetryError> {
     let filter = parse(filter)?;
-    let builder = tracing_subscriber::fmt()
-        .with_env_filter(filter)
+    let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal());
-    match format {
-        LogFormat::Text => builder.try_init(),
-        LogFormat::Json => builder.json().flatten_event(true).try_init(),
-    }
-    .map_err(|_| TelemetryError::AlreadySet)
+    let mut layers: Vec<BoxedLayer> = vec![match format {
+        LogFormat::Text => lines.with_filter(filter).boxed(),
+        LogFormat::Json => lines.json().flatten_event(true).with_filter(filter).boxed(),
+    }];
+    let export = match collector {
+        None => Export::default(),
+        Some(endpoint) => export_to(endpoint, &mut layers)?,
+    };
+    tracing_subscriber::registry()
+        .with(layers)
+        .try_init()
+        .map_err(|_| TelemetryError::AlreadySet)?;
+    Ok(export)
+}
+
+#[cfg(feature = "otlp")]
+fn export_to(endpoint: &str, layers: &mut Vec<BoxedLayer>) -> Result<Export, TelemetryError> {
+    let (traces, layer) = otlp::export_to(endpoint)?;
+    layers.push(layer);
+    Ok(Export {
+        _traces: Some(traces),
+    })
+}
+
+#[cfg(not(feature = "otlp"))]
+fn export_to(_: &str, _: &mut Vec<BoxedLayer>) -> Result<Export, TelemetryError> {
+    Err(TelemetryError::NotBuilt)
 }
 
 /// Logs every panic with its place, thread and message, within the span it happened in, instead of printing it.
