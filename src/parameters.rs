@@ -88,6 +88,8 @@ pub struct Parameters {
     pub fill_holes_below: f64,
     /// Meshes with more vertices are simplified to this many; 0 never does.
     pub working_size: usize,
+    /// Closed meshes with fewer vertices are refined to this many, on the same surface; 0 never does.
+    pub refine_below: usize,
     /// n, the number of eigenpairs.
     pub eigenpairs: usize,
     /// The local descriptor.
@@ -136,6 +138,7 @@ impl Parameters {
             components: Components::Largest,
             fill_holes_below: 1.2,
             working_size: 2000,
+            refine_below: 1000,
             eigenpairs: 200,
             descriptor: Descriptor::Wks,
             energies: 100,
@@ -158,6 +161,7 @@ impl Parameters {
             Preset::Paper => Self {
                 fill_holes_below: 0.0,
                 working_size: 1500,
+                refine_below: 0,
                 energies: 500,
                 normalisation: Normalisation::Unit,
                 atoms: 500,
@@ -171,6 +175,7 @@ impl Parameters {
             },
             Preset::Fast => Self {
                 working_size: 1000,
+                refine_below: 400,
                 eigenpairs: 80,
                 atoms: 64,
                 samples_per_shape: 600,
@@ -209,6 +214,7 @@ impl Parameters {
         if self.working_size != 0 {
             within("working_size", self.working_size, 50, 200_000)?;
         }
+        within("refine_below", self.refine_below, 0, 200_000)?;
         let positive = |x: f64| x.is_finite() && x > 0.0;
         check(
             "lambda",

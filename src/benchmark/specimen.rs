@@ -5,6 +5,7 @@
 use crate::cancel::Cancel;
 use crate::mesh::{PrepareOptions, TriangleSoup, prepare};
 use crate::parameters::{Channel, Hypothesis, Parameters};
+use crate::pipeline::prepared::refined_to;
 use crate::pipeline::{Description, PipelineError, PreparedShape};
 use crate::ranking::View;
 use crate::signature::normalise::normalise;
@@ -62,7 +63,9 @@ pub struct Specimen {
 /// A spectrum solved for, with what it was prepared with.
 struct Solved {
     options: PrepareOptions,
+    refined_to: usize,
     eigenpairs: usize,
+    whitened: bool,
     shape: PreparedShape,
 }
 
@@ -81,8 +84,14 @@ impl Specimen {
         let mut solved: Vec<Solved> = Vec::new();
         let mut spectra = Vec::new();
         let mut seen = Vec::new();
-        for parameters in coding {
-            let at = solve(soup, parameters, &mut solved, &mut spectra, cancel)?;
+        // Those of several hypotheses need more than a plain spectrum, which then serves the others too.
+        let mut places = vec![0; coding.len()];
+        let (plain, several): (Vec<_>, Vec<_>) =
+            (0..coding.len()).partition(|&i| coding[i].hypotheses == [Hypothesis::Plain]);
+        for i in several.into_iter().chain(plain) {
+            places[i] = solve(soup, &coding[i], &mut solved, &mut spectra, cancel)?;
+        }
+        for (parameters, at) in coding.iter().zip(places) {
             let shape = &solved[at].shape;
             seen.push(if parameters.hypotheses == [Hypothesis::Plain] {
                 Seen::Plain {
@@ -185,23 +194,27 @@ fn solve(
     cancel: &Cancel,
 ) -> Result<usize, PipelineError> {
     let options = parameters.prepare_options();
-    let same_number = |s: &Solved| s.eigenpairs == parameters.eigenpairs;
-    if let Some(at) = solved.iter().position(|s| same_number(s) && s.options == options) {
-        return Ok(at);
-    }
     // Preparing is deterministic and reports all it does: equal reports of one soup are equal meshes.
     let (_, report) = prepare(soup.clone(), &options)?;
+    let refined_to = refined_to(&report, parameters);
+    let whitened = parameters.hypotheses.contains(&Hypothesis::Whitened);
     let equal = |s: &Solved| {
-        same_number(s) && s.options.components == options.components && *s.shape.report() == report
+        s.eigenpairs == parameters.eigenpairs
+            && s.refined_to == refined_to
+            && (s.whitened || !whitened)
+            && s.options.components == options.components
+            && *s.shape.report() == report
     };
     if let Some(at) = solved.iter().position(equal) {
         return Ok(at);
     }
     let shape = PreparedShape::new(soup.clone(), parameters, cancel, &|_| ())?;
-    spectra.push(Spectrum::of(shape.eigenpairs(), report.vertices));
+    spectra.push(Spectrum::of(shape.eigenpairs(), shape.signature_vertices()));
     solved.push(Solved {
         options,
+        refined_to,
         eigenpairs: parameters.eigenpairs,
+        whitened,
         shape,
     });
     Ok(solved.len() - 1)

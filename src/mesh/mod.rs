@@ -18,6 +18,7 @@ pub mod orient;
 pub mod ply;
 pub mod prepare;
 pub mod read;
+pub mod refine;
 mod scan;
 pub mod soup;
 pub mod stl;

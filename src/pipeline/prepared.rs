@@ -3,6 +3,7 @@
 use super::{Description, PipelineError, Stage};
 use crate::cancel::Cancel;
 use crate::mesh::boundary::boundary_vertices;
+use crate::mesh::refine::refine;
 use crate::mesh::whiten::whiten;
 use crate::mesh::{PrepareReport, TriMesh, TriangleSoup, prepare_until};
 use crate::parameters::{Channel, Hypothesis, Parameters};
@@ -32,6 +33,19 @@ const FIXED_GRID: DescriptorParameters = DescriptorParameters {
     },
 };
 
+/// How many vertices a prepared mesh is refined to before its spectrum is solved for; 0 where it stays as it is.
+///
+/// An open mesh does: it is likely a part of a shape, and a part sampled as densely as the whole has the whole's
+/// errors of discretisation, which a finer one has not.
+pub fn refined_to(report: &PrepareReport, parameters: &Parameters) -> usize {
+    let enough = report.vertices + report.holes_filled >= parameters.refine_below;
+    if enough || report.openness > OPEN_ABOVE {
+        0
+    } else {
+        parameters.refine_below
+    }
+}
+
 /// A mesh with the spectra its views are taken from.
 #[derive(Clone, Debug)]
 pub struct PreparedShape {
@@ -57,6 +71,7 @@ impl PreparedShape {
     ) -> Result<Self, PipelineError> {
         observer(Stage::Prepare);
         let (mesh, report) = prepare_until(soup, &parameters.prepare_options(), cancel)?;
+        let mesh = refine(mesh, refined_to(&report, parameters))?;
         cancel.check()?;
         observer(Stage::Laplacian);
         let operators = assemble(&mesh)?;
@@ -86,6 +101,11 @@ impl PreparedShape {
     /// What preparing did.
     pub fn report(&self) -> &PrepareReport {
         &self.report
+    }
+
+    /// How many vertices, counted from the first, carry signatures.
+    pub fn signature_vertices(&self) -> usize {
+        self.mesh.signature_vertices()
     }
 
     /// The plain view's eigenpairs.
@@ -124,7 +144,7 @@ impl PreparedShape {
         Ok(views)
     }
 
-    /// Vertices that give signatures: those the file had, at most `count` of them, drawn by area.
+    /// Vertices that give signatures: those on the file's surface, at most `count` of them, drawn by area.
     pub fn sample(&self, count: usize, seed: u64) -> Vec<u32> {
         sample_by_area(
             &self.operators.mass[..self.mesh.signature_vertices()],

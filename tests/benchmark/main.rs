@@ -1,12 +1,13 @@
 //! The deformations do what their names say, and an evaluation tells right from wrong.
 
 use shapelex::benchmark::deform::Deformation;
-use shapelex::benchmark::{LabelledShape, Protocol, evaluate};
+use shapelex::benchmark::specimen::Wanted;
+use shapelex::benchmark::{LabelledShape, Protocol, Specimen, evaluate};
 use shapelex::cancel::Cancel;
 use shapelex::mesh::trimesh::face_area;
 use shapelex::mesh::{Components, PrepareOptions, PrepareReport, TriangleSoup, prepare};
 use shapelex::parameters::{Parameters, Preset};
-use shapelex::pipeline::describe_both;
+use shapelex::pipeline::{PreparedShape, describe_both};
 use shapelex::sample::{Species, ZooOptions};
 use std::collections::BTreeSet;
 
@@ -227,4 +228,40 @@ fn the_robust_preset_undoes_affine_maps_of_a_known_mesh_and_sees_views() {
     let view = Deformation::View.apply(&creature(4, 0), 1, 5);
     let (_, query) = describe_both(view, &robust, &Cancel::new()).unwrap();
     assert_eq!(query.views.len(), 6, "plain, whitened, and four areas");
+}
+
+#[test]
+fn a_specimen_serves_presets_of_few_and_of_many_hypotheses_in_any_order() {
+    let coding = [Preset::Default, Preset::Robust, Preset::Paper].map(Parameters::preset);
+    let specimen = Specimen::describe(&creature(0, 0), &coding, Some(&coding[2]), &Cancel::new()).unwrap();
+    let wanted = Wanted {
+        training: true,
+        query: true,
+    };
+    for (which, channels, hypotheses) in [(0, 1, 1), (1, 3, 2), (2, 1, 1)] {
+        let (training, query) = specimen.descriptions(which, &coding[which], wanted).unwrap();
+        assert_eq!(
+            (training.views.len(), query.views.len()),
+            (channels, hypotheses),
+            "{:?}",
+            coding[which].preset
+        );
+    }
+}
+
+#[test]
+fn a_coarse_closed_mesh_is_refined_before_its_spectrum_and_a_part_is_not() {
+    let parameters = Parameters::preset(Preset::Default);
+    let signatures = |soup: TriangleSoup, parameters: &Parameters| {
+        let shape = PreparedShape::new(soup, parameters, &Cancel::new(), &|_| ()).unwrap();
+        shape.signature_vertices()
+    };
+    let coarse = Deformation::Sampling.apply(&creature(1, 0), 5, 3);
+    let vertices = used(&coarse);
+    assert!(vertices < 200);
+    assert_eq!(signatures(coarse.clone(), &parameters), 1000);
+    let literal = Parameters::preset(Preset::Paper);
+    assert_eq!(signatures(coarse, &literal), vertices);
+    let view = Deformation::View.apply(&creature(1, 0), 1, 3);
+    assert!(signatures(view, &parameters) < 700);
 }

@@ -4,5 +4,6 @@ mod cleaning;
 mod hostile;
 mod hypotheses;
 mod real;
+mod refinement;
 mod shapes;
 mod simplification;

@@ -279,6 +279,8 @@ parameter_set! {
     fill_holes_below: f64;
     /// Meshes with more vertices are simplified to this many; 0 never does.
     working_size: usize;
+    /// Closed meshes with fewer vertices are refined to this many, on the same surface; 0 never does.
+    refine_below: usize;
     /// n, the number of eigenpairs.
     eigenpairs: usize;
     /// The local descriptor.
