@@ -82,7 +82,7 @@ pub struct PrepareReport {
     pub holes_filled: usize,
     /// Vertices before simplification, where the mesh was simplified.
     pub simplified_from: Option<usize>,
-    /// Vertices that carry signatures.
+    /// Vertices that carry signatures, before a coarse mesh is refined.
     pub vertices: usize,
     /// Faces of the prepared mesh.
     pub faces: usize,
@@ -227,7 +227,7 @@ fn warnings(report: &PrepareReport, simplified: Simplified) -> Vec<String> {
     warn(
         report.vertices < FEW_VERTICES,
         format!(
-            "Only {} vertices carry signatures; fewer than {FEW_VERTICES} describe a shape poorly.",
+            "Only {} vertices are left; fewer than {FEW_VERTICES} describe a shape poorly.",
             report.vertices
         ),
     );

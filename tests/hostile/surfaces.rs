@@ -241,8 +241,7 @@ fn nested() -> Vec<u8> {
     text.replacen("\"here\"", &deep, 1).into_bytes()
 }
 
-/// A node below a node, a hundred thousand times, and the mesh at the bottom.
-/// 100 000 nodes, each the only child of the one before; the last one holds a single triangle.
+/// 100 000 nodes, each the only child of the one before; the last one holds a tetrahedron.
 pub fn chain() -> Vec<u8> {
     gltf(|g| {
         let count = 100_000;

@@ -51,7 +51,7 @@ pub struct ReportDto {
     pub holes_filled: usize,
     /// Vertices before simplification, where the mesh was simplified.
     pub simplified_from: Option<usize>,
-    /// Vertices that carry signatures.
+    /// Vertices that carry signatures, before a coarse mesh is refined.
     pub vertices: usize,
     /// Faces of the prepared mesh.
     pub faces: usize,
