@@ -29,7 +29,7 @@ pub enum Preset {
     Paper,
     /// `default` with the affine-whitened and the doubled-open-surface hypotheses (method, step 10).
     Robust,
-    /// `default` with less of everything, for answers within some 20 ms: 1000 vertices, n 80, L 64, 600
+    /// `default` with less of everything, for answers within some 20 ms: 1000 vertices, n 130, L 64, 600
     /// signatures of a training shape and 200 of a query.
     Fast,
 }
@@ -175,8 +175,8 @@ impl Parameters {
             },
             Preset::Fast => Self {
                 working_size: 1000,
-                refine_below: 400,
-                eigenpairs: 80,
+                refine_below: 650,
+                eigenpairs: 130,
                 atoms: 64,
                 samples_per_shape: 600,
                 query_samples: 200,
