@@ -324,8 +324,14 @@ impl ActiveSet {
     #[inline(always)]
     fn append(&mut self, problem: &Problem<'_>, j: usize, value: f64, sign: f64) -> bool {
         self.column.clear();
-        self.column
-            .extend(self.atoms.iter().map(|&i| problem.product(i, j)));
+        if let Some(gram) = problem.gram {
+            let products = column(gram, j);
+            self.column.extend(self.atoms.iter().map(|&i| products[i]));
+        } else {
+            for &i in &self.atoms {
+                self.column.push(problem.product(i, j));
+            }
+        }
         if !self.factor.push(&mut self.column, problem.product(j, j)) {
             return false;
         }
@@ -397,5 +403,39 @@ impl ActiveSet {
         if k < self.target.len() {
             self.target.remove(k);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coding::Dictionary;
+    use faer::Mat;
+
+    #[test]
+    fn an_atom_that_depends_on_the_set_takes_the_place_of_another() {
+        // d_3 = 0.6 (d_1 + d_2) reaches the signal (1, 1) at a lower ‖a‖₁ than the first two together.
+        let identity = |i, j| if i == j { 1.0 } else { 0.0 };
+        let atoms = Mat::from_fn(2, 3, |i, j| if j == 2 { 0.6 } else { identity(i, j) });
+        let dictionary = Dictionary::new(atoms).unwrap();
+        let mut rough = [Lanes::default()];
+        rough[0][..3].copy_from_slice(&[1.0, 1.0, 1.2]);
+        let problem = Problem {
+            atoms: dictionary.atoms().as_ref(),
+            gram: dictionary.known_gram(),
+            rough_gram: &dictionary.screen().gram,
+            rough_gram_error: 0.0,
+            signal: &[1.0, 1.0],
+            norm: 2f64.sqrt(),
+            rough_correlation: &rough,
+            error: 1e-6,
+            lambda: 0.05,
+            tolerance: 1e-11,
+        };
+        let mut set = ActiveSet::default();
+        set.reset(3);
+        assert!(set.append(&problem, 0, 0.5, 1.0) && set.append(&problem, 1, 0.5, 1.0));
+        assert!(set.solve(&problem));
+        assert_eq!(set.atoms, [2]);
     }
 }

@@ -119,7 +119,7 @@ fn an_atom_longer_than_a_combination_of_others_takes_their_place() {
         |i, j| if j == 2 { 0.6 } else { f64::from(u8::from(i == j)) },
     );
     let dictionary = Dictionary::new(atoms).unwrap();
-    // The first signals have the first two atoms active, so the last one starts from them.
+    // The first signals keep to one of the first two atoms each.
     let signals = Mat::from_fn(2, 3, |i, j| [[3.0, 0.5], [0.5, 3.0], [1.0, 1.0]][j][i]);
     let codes = check(&dictionary, &signals, 0.05);
     assert_eq!(codes.atoms[codes.offsets[2]..], [2]);
