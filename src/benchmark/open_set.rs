@@ -5,7 +5,7 @@ use super::evaluate::LabelledShape;
 use crate::cancel::Cancel;
 use crate::parameters::Parameters;
 use crate::pipeline::{Description, PipelineError, held_out_scores, learn_model};
-use crate::ranking::{Calibration, Index, IndexedClass, rank};
+use crate::ranking::{Calibration, Index, IndexedClass, SIGNIFICANCE, rank};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -175,8 +175,8 @@ pub fn evaluate_open_set(
         let verdict = full.judge(ranked.iter().map(|(label, score)| (label.as_str(), *score)));
         let set: Vec<&str> = ranked
             .iter()
-            .zip(verdict.p_values.iter().zip(&verdict.possible))
-            .filter(|(_, (p, possible))| p.is_none() || **possible)
+            .zip(&verdict.p_values)
+            .filter(|(_, p)| p.is_none_or(|p| p > SIGNIFICANCE))
             .map(|((label, _), _)| label.as_str())
             .collect();
         possible += set.len();

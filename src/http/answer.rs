@@ -17,7 +17,7 @@ use crate::model::ClassId;
 use crate::parameters::Parameters;
 use crate::pipeline::prepared::OPEN_ABOVE;
 use crate::pipeline::{Stage, StageSpan, describe_query, describe_shape, rank, rank_top};
-use crate::ranking::Index;
+use crate::ranking::{Index, SIGNIFICANCE};
 use crate::spectral;
 use crate::store::StoreError;
 use std::cell::RefCell;
@@ -105,7 +105,10 @@ pub fn answer(
         name: names.get(label).cloned().unwrap_or_else(|| label.to_owned()),
     };
     let top = options.top.unwrap_or(usize::MAX);
-    let possible = ranking.classes.iter().filter(|c| c.possible);
+    let possible = ranking
+        .classes
+        .iter()
+        .filter(|c| c.p_value.is_some_and(|p| p > SIGNIFICANCE));
     let possible_classes = possible.map(|c| class_of(&c.label)).collect();
     let classes = ranking.classes.into_iter().take(top).enumerate().map(|(i, c)| {
         let coded = c.coded;

@@ -9,8 +9,6 @@ pub(super) struct Class {
     pub(super) score: f64,
     pub(super) margin: Option<f64>,
     pub(super) p_value: Option<f64>,
-    /// Whether the query may be of this class, as far as that can be told.
-    pub(super) possible: bool,
     /// What only sparse coding knows.
     pub(super) coded: Option<ClassScore>,
 }
@@ -45,10 +43,8 @@ impl Ranked {
             return;
         };
         let verdict = calibration.judge(self.classes.iter().map(|c| (c.label.as_str(), c.score)));
-        let judged = verdict.p_values.into_iter().zip(verdict.possible);
-        for (class, (p_value, possible)) in self.classes.iter_mut().zip(judged) {
+        for (class, p_value) in self.classes.iter_mut().zip(verdict.p_values) {
             class.p_value = p_value;
-            class.possible = possible;
         }
         self.none_of_these = Some(verdict.none_of_these);
     }
@@ -61,7 +57,6 @@ impl From<Ranking> for Ranked {
             score: c.score,
             margin: c.margin,
             p_value: None,
-            possible: false,
             coded: Some(c),
         };
         Self {
@@ -101,7 +96,6 @@ impl From<Vec<Nearest>> for Ranked {
             score: n.distance,
             margin: margin(i),
             p_value: None,
-            possible: false,
             coded: None,
         });
         Self {

@@ -12,9 +12,6 @@ use std::collections::BTreeMap;
 /// A class is believed possible while its p-value is above this; the true class then is, for 95 of 100 queries that are
 /// like the training shapes.
 pub const SIGNIFICANCE: f64 = 0.05;
-/// A query is of none of the classes only where every p-value is at most this, or lower than any held-out shape's: to
-/// refuse a shape is worse than to have one class too many in the set.
-const REFUSAL: f64 = 0.03;
 /// How many held-out shapes the common deviation counts for beside a class's own.
 const COMMON_DEVIATION_WEIGHT: f64 = 10.0;
 /// Fewer held-out shapes cannot give a p-value of 0.05.
@@ -47,10 +44,7 @@ pub struct Calibration {
 pub struct Verdict {
     /// p-values in the order of the ranking; `None` for a class without held-out shapes.
     pub p_values: Vec<Option<f64>>,
-    /// Which classes are possible, in the same order: those with a p-value above 0.05, or where there is none and the
-    /// query is not refused, the one with the largest.
-    pub possible: Vec<bool>,
-    /// Whether all p-values are at most 0.03 and the best class was judged: the query is of none of them.
+    /// Whether no class is possible, and the best one was judged: the query is of none of them.
     pub none_of_these: bool,
 }
 
@@ -123,16 +117,9 @@ impl Calibration {
             .map(|(label, score)| self.p_value(label, score))
             .collect();
         let judged = p_values.first().is_some_and(Option::is_some);
-        let refusal = REFUSAL.max(1.0 / (self.nonconformities.len() + 1) as f64);
-        let none_of_these = judged && p_values.iter().flatten().all(|p| *p <= refusal);
-        let largest = p_values.iter().flatten().copied().fold(0.0, f64::max);
-        let possible = p_values
-            .iter()
-            .map(|p| p.is_some_and(|p| p > SIGNIFICANCE || (judged && !none_of_these && p == largest)))
-            .collect();
+        let none_of_these = judged && p_values.iter().flatten().all(|p| *p <= SIGNIFICANCE);
         Verdict {
             p_values,
-            possible,
             none_of_these,
         }
     }
@@ -184,19 +171,6 @@ mod tests {
         let calibration = two_classes();
         assert!(calibration.judge([("cat", 0.5), ("dog", 0.9)]).none_of_these);
         assert!(!calibration.judge([("cat", 0.5), ("dog", 0.6)]).none_of_these);
-        // Between the two thresholds a query is not refused, and its best class is the possible one.
-        let scores: Vec<f64> = (0..50)
-            .map(|i| 0.3 * 1.1f64.powf(f64::from(i) / 24.5 - 1.0))
-            .collect();
-        let calibration_of_50 = Calibration::fit([("cat", scores.as_slice())]).expect("enough shapes");
-        let between = calibration_of_50.judge([("cat", scores[48] * 1.0001)]);
-        assert!(
-            between.p_values[0].is_some_and(|p| p > REFUSAL && p < SIGNIFICANCE),
-            "{between:?}"
-        );
-        assert!(between.possible[0] && !between.none_of_these);
-        let beyond = calibration_of_50.judge([("cat", 0.5)]);
-        assert!(beyond.none_of_these && !beyond.possible[0]);
         // The best class cannot be judged, so nothing is claimed.
         assert!(!calibration.judge([("cow", 0.1), ("cat", 0.5)]).none_of_these);
     }

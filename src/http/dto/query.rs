@@ -92,13 +92,12 @@ pub struct QueryAnswer {
     /// answer is the same as if they had been. Above 0 only where `top` is given and small against the number of
     /// classes.
     pub pruned: usize,
-    /// Whether the query is believed to be of none of the indexed classes: no answered class has a p-value above 0.03.
+    /// Whether the query is believed to be of none of the indexed classes: no answered class has a p-value above 0.05.
     /// `null` where that cannot be told: with fewer than 19 training shapes beside each class's first, of an open
     /// surface such as a single view, and where the ranking is not by the index's own measure.
     pub none_of_these: Option<bool>,
-    /// The classes with a p-value above 0.05, or the one with the largest where there is none and the query is not
-    /// refused. For 95 of 100 queries that are like the training shapes the true class is among them. Empty where nothing
-    /// can be told.
+    /// The classes with a p-value above 0.05. For 95 of 100 queries that are like the training shapes the true class is
+    /// among them. Empty where nothing can be told.
     pub possible_classes: Vec<ClassRef>,
     /// Whether the time limit came before all classes were compared with.
     pub partial: bool,
