@@ -182,9 +182,10 @@ fn iterate_body<V: Vector, const L: usize, const B: usize>(
     let mut squares = V::splat(0.0);
     for i in 0..m {
         let mut value = theta.times_from(load(&x[i]), V::splat(0.0));
-        for j in i.saturating_sub(B)..(i + B + 1).min(m) {
+        let first = i.saturating_sub(B);
+        for (j, x) in (first..).zip(&x[first..(i + B + 1).min(m)]) {
             let t = band.values[i.min(j) * (B + 1) + i.abs_diff(j)];
-            value = V::splat(t).times_plus(load(&x[j]), value);
+            value = V::splat(t).times_plus(load(x), value);
         }
         squares = value.times_plus(value, squares);
     }
@@ -250,7 +251,7 @@ fn orthonormal(mut z: Mat<f64>) -> Option<Mat<f64>> {
         if size <= ORTHOGONALITY {
             return Some(z);
         }
-        if !(size <= REPAIRABLE) {
+        if size.is_nan() || size > REPAIRABLE {
             return None;
         }
         // Z (3 − ZᵀZ) / 2, one step of the iteration for the polar factor.
