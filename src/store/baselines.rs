@@ -50,7 +50,7 @@ impl Record for ModelRecord {
         only(version, 1)?;
         let v: ModelV1 = unpack(payload)?;
         let (rows, columns) = (v.rows as usize, v.columns as usize);
-        if rows.checked_mul(columns) != Some(v.words.len()) {
+        if rows == 0 || rows.checked_mul(columns) != Some(v.words.len()) {
             return Err("the words' size is not that of their values".to_owned());
         }
         Ok(Self(BaselineModel {

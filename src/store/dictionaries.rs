@@ -21,7 +21,18 @@ const CHANNELS: [(u8, Channel); 3] = [
     (3, Channel::FixedGrid),
 ];
 
+/// As many atoms as parameters may ask for.
+const MAX_ATOMS: usize = 5000;
+
 pub(super) struct DictionaryRecord(Dictionaries);
+
+/// A dictionary's Gram matrix has L² values, however short its record is.
+fn check_size(m: usize, l: usize) -> Result<(), String> {
+    if m == 0 || l > MAX_ATOMS {
+        return Err(format!("{l} atoms of {m} values are no dictionary"));
+    }
+    Ok(())
+}
 
 impl Record for DictionaryRecord {
     const FAMILY: Family = Family::Dictionary;
@@ -37,6 +48,7 @@ impl Record for DictionaryRecord {
                 .ok_or("a channel has no number")?
                 .0;
             let (m, l) = (dictionary.dimension(), dictionary.len());
+            check_size(m, l)?;
             let narrow = |n: usize| u32::try_from(n).map_err(|_| "dictionary too large".to_owned());
             bytes.push(number);
             bytes.extend_from_slice(&narrow(m)?.to_le_bytes());
@@ -67,6 +79,7 @@ impl Record for DictionaryRecord {
                 .ok_or("cut short in a dictionary's size")?;
             let m = u32::from_le_bytes([head[0], head[1], head[2], head[3]]) as usize;
             let l = u32::from_le_bytes([head[4], head[5], head[6], head[7]]) as usize;
+            check_size(m, l)?;
             let length = m
                 .checked_mul(l)
                 .and_then(|n| n.checked_mul(4))
