@@ -13,7 +13,7 @@ use serde_json::json;
 use shapelex::cancel::Cancel;
 use shapelex::mesh::{Limits, Source, read};
 use shapelex::parameters::{Parameters, RankBy};
-use shapelex::pipeline::{Description, describe_query, held_out_scores, learn_model};
+use shapelex::pipeline::{Description, describe_query, describe_shape, held_out_scores, learn_model};
 use shapelex::ranking::{rank, rank_top};
 use std::error::Error;
 use std::f64::consts::TAU;
@@ -91,7 +91,11 @@ fn shapes(sizes: &[usize]) -> Outcome<()> {
     for &count in sizes {
         while described.len() < count {
             let started = Instant::now();
-            described.push(zoo::training_shape(described.len(), &parameters)?);
+            // Poses are five apart, as the next three are tried where one has no surface.
+            let pose = 5 * described.len();
+            described.push(zoo::describe(0, pose, &zoo::TRAINING, |soup| {
+                describe_shape(soup, &parameters, &Cancel::new(), &|_| ())
+            })?);
             describe_ms += milliseconds(started);
         }
         let shapes: Vec<&Description> = described[..count].iter().collect();

@@ -25,7 +25,7 @@ pub const REAL: usize = 48;
 /// Seed of the creatures and mixtures.
 const SEED: u64 = 7;
 /// Training shapes of these classes are small.
-const TRAINING: ZooOptions = ZooOptions {
+pub const TRAINING: ZooOptions = ZooOptions {
     min_vertices: 450,
     max_vertices: 800,
     upright: false,
@@ -147,14 +147,6 @@ fn learnt(number: usize) -> Result<Mat<f64>, String> {
     Ok(model.dictionaries[&Channel::Plain].atoms().clone())
 }
 
-/// Pose `number` of one creature, described for training.
-pub fn training_shape(number: usize, parameters: &Parameters) -> Outcome<Description> {
-    // Poses are five apart, as `describe` tries the next four where one has no surface.
-    Ok(describe(0, 5 * number, &TRAINING, |soup| {
-        describe_shape(soup, parameters, &Cancel::new(), &|_| ())
-    })?)
-}
-
 fn queried(number: usize) -> Result<Mat<f64>, String> {
     let parameters = parameters();
     let described = describe(number, 50, &QUERY, |soup| {
@@ -163,8 +155,8 @@ fn queried(number: usize) -> Result<Mat<f64>, String> {
     Ok(described.views[0].signatures.matrix.clone())
 }
 
-/// The first pose from `pose` on that has a surface at this size.
-fn describe(
+/// The first pose from `pose` on that has a surface at this size, of four.
+pub fn describe(
     number: usize,
     pose: usize,
     options: &ZooOptions,
