@@ -103,11 +103,12 @@ fn shapes(sizes: &[usize]) -> Outcome<()> {
         black_box(learn_model(&shapes, &parameters, &Cancel::new(), &|_, _| ())?);
         let learn_ms = milliseconds(started);
         let started = Instant::now();
-        black_box(held_out_scores(&shapes, &parameters, &Cancel::new())?);
+        let held_out = black_box(held_out_scores(&shapes, &parameters, &Cancel::new())?);
+        let calibrate_ms = milliseconds(started);
         println!(
             "{}",
             json!({ "shapes": count, "describe_ms": describe_ms / described.len() as f64 * count as f64,
-                "learn_ms": learn_ms, "calibrate_ms": milliseconds(started),
+                "learn_ms": learn_ms, "calibrate_ms": (!held_out.is_empty()).then_some(calibrate_ms),
                 "resident_kilobytes": resident_kilobytes() })
         );
     }

@@ -71,8 +71,8 @@ impl Path {
         let mut row = [0.0; REACH];
         for i in 0..n {
             let mut value = problem.product(self.atoms[i], j);
-            for k in 0..i {
-                value -= self.factor[i][k] * row[k];
+            for (above, x) in self.factor[i][..i].iter().zip(&row) {
+                value -= above * x;
             }
             row[i] = value * self.inverse_diagonal[i];
             pivot -= row[i] * row[i];
