@@ -5,7 +5,7 @@ use faer::Mat;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use shapelex::cancel::Cancel;
-use shapelex::coding::{Dictionary, LearnParameters, Signals, Workspace, encode_with, learn, score_signals};
+use shapelex::coding::{Dictionary, LearnParameters, Signals, encode, learn, score_signals};
 use std::hint::black_box;
 
 /// Bumps that move and swell smoothly from signal to signal, as signatures do along a mesh; unit norm times `norm`.
@@ -66,28 +66,11 @@ fn coding(criterion: &mut Criterion) {
             bencher.iter(|| black_box(Dictionary::new(dictionary.atoms().clone())));
         });
         for lambda in [0.5, 0.05] {
-            let mut workspace = Workspace::default();
             group.bench_function(format!("encode/{name}/{lambda}"), |bencher| {
-                bencher.iter(|| {
-                    black_box(encode_with(
-                        &mut workspace,
-                        &dictionary,
-                        query.as_ref(),
-                        lambda,
-                        &cancel,
-                    ))
-                });
+                bencher.iter(|| black_box(encode(&dictionary, query.as_ref(), lambda, &cancel)));
             });
             group.bench_function(format!("score/{name}/{lambda}"), |bencher| {
-                bencher.iter(|| {
-                    black_box(score_signals(
-                        &mut workspace,
-                        &dictionary,
-                        &ready,
-                        lambda,
-                        &cancel,
-                    ))
-                });
+                bencher.iter(|| black_box(score_signals(&dictionary, &ready, lambda, &cancel)));
             });
         }
     }

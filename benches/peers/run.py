@@ -19,6 +19,10 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 
 
+# A query codes its signals under one class after the other, this many in the rows of the query.
+CALLS = 12
+
+
 class Process:
     """A worker that answers one JSON line per JSON line."""
 
@@ -125,17 +129,18 @@ def main():
         scratch = Path(scratch)
         zoo = creatures(options.shapelex, scratch / "zoo", 12, 5 if options.quick else 13)
         for threads in map(int, options.threads.split(",")):
-            ours = Process([options.ours], threads)
-            peer = Process([sys.executable, str(HERE / "peer.py"), str(threads)], threads)
+            # Memory is that of a process, so every kind of work has processes of its own.
+            ours = lambda: Process([options.ours], threads)
+            peer = lambda: Process([sys.executable, str(HERE / "peer.py"), str(threads)], threads)
             label = f"{threads} thread{'s' if threads > 1 else ''}"
             if "eigen" in wanted:
-                eigen(table, ours, peer, zoo, scratch, label, options.quick)
+                eigen(table, ours(), peer(), zoo, scratch, label, options.quick)
             if "lasso" in wanted or "learn" in wanted:
                 coding(table, ours, peer, zoo, scratch, label, options.quick, wanted, threads)
             if "query" in wanted or "reindex" in wanted:
                 whole(table, ours, peer, zoo, scratch, label, options.quick, wanted, threads)
             if "read" in wanted and threads == 1:
-                reading(table, ours, peer, zoo, scratch, options.quick)
+                reading(table, ours(), peer(), zoo, scratch, options.quick)
     if options.json:
         print(json.dumps(table.rows))
 
@@ -191,9 +196,8 @@ def eigen(table, ours, peer, zoo, scratch, label, quick):
 
 
 def coding(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
-    if threads > 1:
-        return  # Both sides code one class on one thread; classes are what runs in parallel.
     class_meshes = next(iter(zoo.values()))
+    helper, judging = ours(), peer()
     settings = [("default", "sqrt_unit", 128), ("paper", "unit", 500), ("paper", "raw", 500)]
     for preset, normalisation, atoms in settings:
         parts = []
@@ -202,7 +206,7 @@ def coding(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
             # A query is coded at every vertex, a training shape at the preset's sample.
             whole = {"samples": 0} if i == len(class_meshes[:5]) - 1 else {}
             describe = dict(mesh=mesh, preset=preset, normalisation=normalisation, signals=str(path), **whole)
-            rows, _ = ours(op="describe", **describe)["shape"]
+            rows, _ = helper(op="describe", **describe)["shape"]
             parts.append(path)
         held_out = scratch / "held_out"
         held_out.write_bytes(parts[-1].read_bytes()[: 1500 * rows * 8])
@@ -210,23 +214,26 @@ def coding(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
         training.write_bytes(b"".join(p.read_bytes() for p in parts[:-1]))
         setup = dict(signals=str(training), rows=rows, atoms=atoms, batch=256)
         name = f"{preset} preset, {normalisation}"
-        if normalisation != "raw" and "learn" in wanted:
-            judge = lambda d: peer(op="objective", signals=str(held_out), dictionary=d, rows=rows, parameter=0.5)["objective"]
+        # Both sides learn a class on one thread; classes are what runs in parallel.
+        if normalisation != "raw" and "learn" in wanted and threads == 1:
+            judge = lambda d: judging(op="objective", signals=str(held_out), dictionary=d, rows=rows, parameter=0.5)["objective"]
+            a, b = ours(), peer()
             table.measure(
                 f"learning, {name}, {label}", 2 if quick else 4,
-                lambda: ours(op="learn", **setup, **{"lambda": 0.5}, iterations=25, dictionary=str(scratch / "d_ours")),
-                lambda: peer(op="learn", **setup, parameter=0.5, iterations=25, dictionary=str(scratch / "d_theirs")),
+                lambda: a(op="learn", **setup, **{"lambda": 0.5}, iterations=25, dictionary=str(scratch / "d_ours")),
+                lambda: b(op="learn", **setup, parameter=0.5, iterations=25, dictionary=str(scratch / "d_theirs")),
                 lambda a, b: judge(str(scratch / "d_ours")) <= judge(str(scratch / "d_theirs")) * (1 + 1e-4),
             )
-        peer(op="learn", **setup, parameter=0.5, iterations=25, dictionary=str(scratch / "d"))
+        judging(op="learn", **setup, parameter=0.5, iterations=25, dictionary=str(scratch / "d"))
         files = dict(signals=str(held_out), dictionary=str(scratch / "d"), rows=rows)
-        ours(op="dictionary", **files)
-        peer(op="dictionary", **files)
+        a, b = ours(), peer()
+        a(op="dictionary", **files)
+        b(op="dictionary", **files)
         for parameter in (0.5, 0.05) if "lasso" in wanted else ():
             table.measure(
                 f"Lasso of 1500 signals, {name}, lambda {parameter}, {label}", 3 if quick else 7,
-                lambda: ours(op="lasso", **{"lambda": parameter}),
-                lambda: peer(op="lasso", parameter=parameter),
+                lambda: a(op="lasso", calls=CALLS, **{"lambda": parameter}),
+                lambda: b(op="lasso", calls=CALLS, parameter=parameter),
                 lambda a, b: abs(a["objective"] - b["objective"]) <= 1e-6 * b["objective"],
             )
 
@@ -240,18 +247,22 @@ def whole(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
         directory = scratch / f"index-{preset}"
         directory.mkdir(exist_ok=True)
         poses = len(classes[0]["meshes"])
+        learner = ours()
         if preset == "default" and "reindex" in wanted:
+            other = peer()
             table.measure(
                 f"whole reindex, 12 classes x {poses} shapes, {preset} preset, {label} against as many processes", 1,
-                lambda: ours(op="index", preset=preset, classes=classes, out=str(directory)),
-                lambda: peer(op="index", preset=preset, classes=classes),
+                lambda: learner(op="index", preset=preset, classes=classes, out=str(directory)),
+                lambda: other(op="index", preset=preset, classes=classes),
                 lambda a, b: True,
             )
         else:
-            ours(op="index", preset=preset, classes=classes, out=str(directory))
+            learner(op="index", preset=preset, classes=classes, out=str(directory))
         if "query" not in wanted:
             continue
-        peer(op="load", preset=preset, dir=str(directory))
+        a, b = ours(), peer()
+        a(op="load", preset=preset, dir=str(directory))
+        b(op="load", preset=preset, dir=str(directory))
         meshes = list(held_out.items())
         turn = {"ours": 0, "theirs": 0}
 
@@ -262,8 +273,8 @@ def whole(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
 
         table.measure(
             f"whole query, 12 classes, {preset} preset, {label}", 4 if quick else 12,
-            lambda: ours(op="query", mesh=next_mesh("ours")),
-            lambda: peer(op="query", mesh=next_mesh("theirs")),
+            lambda: a(op="query", mesh=next_mesh("ours")),
+            lambda: b(op="query", mesh=next_mesh("theirs")),
             lambda a, b: a["best"] == b["best"] and abs(a["score"] - b["score"]) < 1e-4 * b["score"],
         )
 

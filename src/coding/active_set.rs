@@ -7,7 +7,8 @@
 //! search ends at the exact solution. Rounding can break the argument where atoms depend on each other; a step limit
 //! catches that, and the caller falls back to coordinate descent.
 
-use super::cholesky::{Factor, long_dot};
+use super::cholesky::Factor;
+use super::dot::dot;
 use super::lasso::column;
 use super::path::{Arrival, Path};
 use super::scan::{Lanes, Rows, largest_magnitude, pieces, place_of, residual_gradient, step_along};
@@ -21,6 +22,8 @@ const ADDED_AT_ONCE: usize = 4;
 pub(super) struct Problem<'a> {
     /// D, M × L, columns contiguous.
     pub atoms: MatRef<'a, f64>,
+    /// ‖d_j‖² of each atom.
+    pub squares: &'a [f64],
     /// DᵀD, L × L, columns contiguous, where it is known.
     pub gram: Option<MatRef<'a, f64>>,
     /// DᵀD at single precision.
@@ -82,7 +85,7 @@ impl Problem<'_> {
     pub fn product(&self, i: usize, j: usize) -> f64 {
         match self.gram {
             Some(gram) => column(gram, j)[i],
-            None => long_dot(column(self.atoms, i), column(self.atoms, j)),
+            None => dot(column(self.atoms, i), column(self.atoms, j)),
         }
     }
 
@@ -207,7 +210,7 @@ impl ActiveSet {
         }
         if self.known[j] != self.signal {
             self.known[j] = self.signal;
-            self.correlation[j] = long_dot(column(problem.atoms, j), problem.signal);
+            self.correlation[j] = dot(column(problem.atoms, j), problem.signal);
         }
         self.correlation[j]
     }
@@ -296,7 +299,7 @@ impl ActiveSet {
             let gradient = self.exact_gradient(problem, j);
             if gradient.abs() > worst {
                 worst = gradient.abs();
-                let step = (gradient - problem.lambda * gradient.signum()) / problem.product(j, j);
+                let step = (gradient - problem.lambda * gradient.signum()) / problem.squares[j];
                 self.added.clear();
                 self.added.push((j, step));
             }
@@ -332,7 +335,7 @@ impl ActiveSet {
                 self.column.push(problem.product(i, j));
             }
         }
-        if !self.factor.push(&mut self.column, problem.product(j, j)) {
+        if !self.factor.push(&mut self.column, problem.squares[j]) {
             return false;
         }
         self.atoms.push(j);
@@ -422,6 +425,7 @@ mod tests {
         rough[0][..3].copy_from_slice(&[1.0, 1.0, 1.2]);
         let problem = Problem {
             atoms: dictionary.atoms().as_ref(),
+            squares: dictionary.squares(),
             gram: dictionary.known_gram(),
             rough_gram: &dictionary.screen().gram,
             rough_gram_error: 0.0,

@@ -14,13 +14,12 @@ pub(super) struct Factor {
     rotations: Vec<(f64, f64)>,
 }
 
+/// xᵀy of equally many values: the eights in eight sums side by side, then what is left, one after the other.
+///
+/// The last value of a row's solution was written just before it is read here. Read on its own it comes from the
+/// processor's store buffer; as part of a vector it would have to be waited for.
 #[inline(always)]
-fn start(row: usize) -> usize {
-    row * (row + 1) / 2
-}
-
-#[inline(always)]
-pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
+fn short_dot(x: &[f64], y: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (x8, y8) = (x.chunks_exact(8), y.chunks_exact(8));
     let mut tail = 0.0;
@@ -32,28 +31,17 @@ pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
             sums[k] += a[k] * b[k];
         }
     }
-    let [a, b, c, d, e, f, g, h] = sums;
-    ((a + b) + (c + d)) + ((e + f) + (g + h)) + tail
-}
-
-/// As [`dot`] in more sums side by side, for vectors of hundreds of values.
-#[inline(always)]
-pub(super) fn long_dot(x: &[f64], y: &[f64]) -> f64 {
-    const LANES: usize = 16;
-    let mut sums = [0.0; LANES];
-    let (x_pieces, y_pieces) = (x.chunks_exact(LANES), y.chunks_exact(LANES));
-    let tail = dot(x_pieces.remainder(), y_pieces.remainder());
-    for (a, b) in x_pieces.zip(y_pieces) {
-        for k in 0..LANES {
-            sums[k] += a[k] * b[k];
-        }
-    }
-    for width in [8, 4, 2, 1] {
+    for width in [4, 2, 1] {
         for k in 0..width {
             sums[k] += sums[k + width];
         }
     }
     sums[0] + tail
+}
+
+#[inline(always)]
+pub(super) fn start(row: usize) -> usize {
+    row * (row + 1) / 2
 }
 
 impl Factor {
@@ -75,7 +63,7 @@ impl Factor {
     #[inline(always)]
     pub fn push(&mut self, column: &mut [f64], diagonal: f64) -> bool {
         self.solve_lower(column);
-        let pivot = diagonal - dot(column, column);
+        let pivot = diagonal - short_dot(column, column);
         if pivot.is_nan() || pivot <= DEPENDENT * diagonal {
             return false;
         }
@@ -117,6 +105,11 @@ impl Factor {
     /// x ← F⁻¹ x.
     #[inline(always)]
     pub fn solve_lower(&self, x: &mut [f64]) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx512f") {
+            // SAFETY: the function needs nothing but AVX-512F, which was just detected.
+            return unsafe { super::wide_factor::solve_lower(&self.rows, &self.inverse_diagonal, x) };
+        }
         for i in 0..x.len() {
             let (done, rest) = x.split_at_mut(i);
             rest[0] = self.solve_row(i, done, rest[0]);
@@ -127,12 +120,17 @@ impl Factor {
     #[inline(always)]
     pub fn solve_row(&self, i: usize, before: &[f64], value: f64) -> f64 {
         let row = &self.rows[start(i)..start(i) + i];
-        (value - dot(row, before)) * self.inverse_diagonal[i]
+        (value - short_dot(row, before)) * self.inverse_diagonal[i]
     }
 
     /// x ← F⁻ᵀ x.
     #[inline(always)]
     pub fn solve_upper(&self, x: &mut [f64]) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx512f") {
+            // SAFETY: the function needs nothing but AVX-512F, which was just detected.
+            return unsafe { super::wide_factor::solve_upper(&self.rows, &self.inverse_diagonal, x) };
+        }
         for i in (0..x.len()).rev() {
             let (before, rest) = x.split_at_mut(i);
             let value = rest[0] * self.inverse_diagonal[i];

@@ -1,16 +1,23 @@
 //! A dictionary: L atoms of M values, and what the Lasso needs of it over and over.
 
 use super::CodingError;
+use super::dot::dot;
 use super::screen::Screen;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par};
 use std::sync::OnceLock;
 
-/// A learnt dictionary D with its Gram matrix.
+/// Gram matrices of up to so many entries (1 MB) are kept; of larger ones, most of whose entries few codes touch, a
+/// product is computed when it is met.
+const KEPT: usize = 1 << 17;
+
+/// A learnt dictionary D with what the Lasso needs of it.
 #[derive(Clone, Debug)]
 pub struct Dictionary {
     atoms: Mat<f64>,
-    /// Computed at once for a dictionary that codes many signals, and for one that codes few only where it is missed.
+    /// ‖d_j‖² of each atom.
+    squares: Vec<f64>,
+    /// Computed at once for a dictionary of few atoms that codes many signals, and for others only where it is missed.
     gram: OnceLock<Mat<f64>>,
     screen: Screen,
 }
@@ -18,11 +25,8 @@ pub struct Dictionary {
 impl Dictionary {
     /// Takes D (M × L, one atom per column, ‖d_j‖ ≤ 1 up to rounding, all finite) and computes DᵀD.
     pub fn new(atoms: Mat<f64>) -> Result<Self, CodingError> {
-        for j in 0..atoms.ncols() {
-            let mut norm2 = 0.0;
-            for i in 0..atoms.nrows() {
-                norm2 += atoms[(i, j)] * atoms[(i, j)];
-            }
+        let squares = squares(&atoms);
+        for &norm2 in &squares {
             if !norm2.is_finite() {
                 return Err(CodingError::NotFinite { what: "dictionary" });
             }
@@ -36,14 +40,24 @@ impl Dictionary {
         }
         let gram = gram(&atoms);
         let screen = Screen::new(&atoms, &gram);
-        let gram = OnceLock::from(gram);
-        Ok(Self { atoms, gram, screen })
+        let kept = if gram.ncols() * gram.nrows() <= KEPT {
+            OnceLock::from(gram)
+        } else {
+            OnceLock::new()
+        };
+        Ok(Self {
+            atoms,
+            squares,
+            gram: kept,
+            screen,
+        })
     }
 
     /// As [`Dictionary::new`] for atoms known to be sound, and quicker: for coding a few hundred signals and no more.
     pub(super) fn for_few_signals(atoms: Mat<f64>) -> Self {
         let screen = Screen::direct(&atoms);
         Self {
+            squares: squares(&atoms),
             atoms,
             gram: OnceLock::new(),
             screen,
@@ -60,9 +74,16 @@ impl Dictionary {
         self.gram.get_or_init(|| gram(&self.atoms))
     }
 
-    /// DᵀD where it has been computed.
+    /// DᵀD where it has been computed and is small. Whether a large one has been depends on what was coded before, and
+    /// codes must not, to the last bit.
     pub(super) fn known_gram(&self) -> Option<MatRef<'_, f64>> {
-        self.gram.get().map(|gram| gram.as_ref())
+        let small = |gram: &&Mat<f64>| gram.ncols() * gram.nrows() <= KEPT;
+        self.gram.get().filter(small).map(|gram| gram.as_ref())
+    }
+
+    /// ‖d_j‖² of each atom.
+    pub(super) fn squares(&self) -> &[f64] {
+        &self.squares
     }
 
     pub(super) fn screen(&self) -> &Screen {
@@ -83,6 +104,12 @@ impl Dictionary {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+}
+
+fn squares(atoms: &Mat<f64>) -> Vec<f64> {
+    (0..atoms.ncols())
+        .map(|j| dot(atoms.col_as_slice(j), atoms.col_as_slice(j)))
+        .collect()
 }
 
 /// DᵀD: half of it is computed, the other mirrored.

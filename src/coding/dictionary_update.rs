@@ -1,8 +1,8 @@
 //! The dictionary half of online learning: running sums, block-coordinate descent on the atoms, and what replaces
 //! atoms of no use (Mairal et al. 2010, Algorithm 2 and Section 3.4).
 
-use super::cholesky::{dot, long_dot};
 use super::dispatch::{Kernel, fastest};
+use super::dot::dot;
 use super::initialise::jittered;
 use super::lasso::column;
 use super::{Codes, Dictionary};
@@ -177,7 +177,7 @@ impl DictionaryUpdate {
         let mut duplicates = Vec::new();
         let product = |i: usize, j: usize| {
             let atom = |k: usize| column(dictionary.atoms().as_ref(), k);
-            long_dot(atom(i), atom(j))
+            dot(atom(i), atom(j))
         };
         let norms: Vec<f64> = (0..count).map(|j| product(j, j).sqrt()).collect();
         // Where single precision sees that none is near, none is.

@@ -1,7 +1,7 @@
 //! Where learning starts: distinct signals, and atoms drawn from them.
 
-use super::cholesky::dot;
 use super::dispatch::{Kernel, fastest};
+use super::dot::dot;
 use super::lasso::column;
 use faer::MatRef;
 use rand::Rng;

@@ -4,7 +4,7 @@
 //! elsewhere.
 
 use super::active_set::Problem;
-use super::cholesky::dot;
+use super::dot::dot;
 use super::lasso::column;
 use super::{Codes, CodingError, Dictionary};
 use faer::MatRef;
@@ -117,6 +117,7 @@ mod tests {
         let codes = encode(&dictionary, signals.as_ref(), 0.05, &Cancel::new()).unwrap();
         let problem = Problem {
             atoms: dictionary.atoms().as_ref(),
+            squares: dictionary.squares(),
             gram: None,
             rough_gram: &Rows::default(),
             rough_gram_error: 0.0,

@@ -3,7 +3,7 @@
 use super::dictionary_update::DictionaryUpdate;
 use super::initialise::{distinct, initial_atoms};
 use super::lasso::{check_lambda, column, with_column_major};
-use super::{CodingError, Dictionary, Signals, Workspace, encode_with, score_signals};
+use super::{CodingError, Dictionary, Signals, encode, score_signals};
 use crate::cancel::Cancel;
 use faer::{Mat, MatRef};
 use rand::SeedableRng;
@@ -126,16 +126,14 @@ fn learn_columns(
     let measured = Signals::new(measured.as_ref())?;
     order.shuffle(&mut random);
 
-    let mut workspace = Workspace::default();
-    let mut mean_objective = |dictionary: &Dictionary| -> Result<f64, CodingError> {
-        let scores = score_signals(&mut workspace, dictionary, &measured, parameters.lambda, cancel)?;
+    let mean_objective = |dictionary: &Dictionary| -> Result<f64, CodingError> {
+        let scores = score_signals(dictionary, &measured, parameters.lambda, cancel)?;
         Ok(scores.iter().map(|score| score.objective).sum::<f64>() / scores.len() as f64)
     };
     let first = Dictionary::for_few_signals(rounded(&initial, signals.nrows()));
     let initial_objective = mean_objective(&first)?;
 
     let mut update = DictionaryUpdate::new(initial, signals.nrows(), parameters.batch);
-    let mut workspace = Workspace::default();
     let batch = parameters.batch.min(order.len());
     let mut next = 0;
     for iteration in 0..parameters.iterations {
@@ -151,13 +149,7 @@ fn learn_columns(
         }
         let batch = gather(signals, &drawn);
         let dictionary = update.dictionary();
-        let codes = encode_with(
-            &mut workspace,
-            &dictionary,
-            batch.as_ref(),
-            parameters.lambda,
-            cancel,
-        )?;
+        let codes = encode(&dictionary, batch.as_ref(), parameters.lambda, cancel)?;
         update.step(&dictionary, batch.as_ref(), &codes, &mut random);
         progress(iteration + 1, parameters.iterations);
     }

@@ -5,6 +5,7 @@ mod cholesky;
 pub mod dictionary;
 mod dictionary_update;
 mod dispatch;
+mod dot;
 pub mod error;
 mod initialise;
 pub mod kkt;
@@ -16,10 +17,13 @@ mod screen;
 pub mod signals;
 #[cfg(target_arch = "x86_64")]
 mod wide;
+#[cfg(target_arch = "x86_64")]
+mod wide_factor;
+mod workspace;
 
 pub use dictionary::Dictionary;
 pub use error::CodingError;
 pub use kkt::kkt_violation;
-pub use lasso::{CodeScore, Codes, Workspace, encode, encode_signals, encode_with, score_signals};
+pub use lasso::{CodeScore, Codes, encode, encode_signals, score_signals};
 pub use learn::{LearnParameters, LearnReport, learn};
 pub use signals::Signals;

@@ -6,7 +6,7 @@
 //! few non-zeros that is hardly more looks at the gradient than the code has atoms, and it needs no neighbour.
 
 use super::active_set::{ActiveSet, Problem};
-use super::cholesky::long_dot;
+use super::dot::dot;
 use super::lasso::column;
 use super::scan::{first_crossing, largest_magnitude, move_towards, place_of, residual_gradient};
 
@@ -66,7 +66,7 @@ impl Path {
     #[inline(always)]
     fn factorise(&mut self, problem: &Problem<'_>, n: usize) -> bool {
         let j = self.atoms[n];
-        let diagonal = problem.product(j, j);
+        let diagonal = problem.squares[j];
         let mut pivot = diagonal;
         let mut row = [0.0; REACH];
         for i in 0..n {
@@ -143,7 +143,7 @@ impl Path {
     fn sharpen(&mut self, problem: &Problem<'_>) -> f64 {
         let mut shift2 = 0.0;
         for k in 0..self.count {
-            self.correlations[k] = long_dot(column(problem.atoms, self.atoms[k]), problem.signal);
+            self.correlations[k] = dot(column(problem.atoms, self.atoms[k]), problem.signal);
             let rough = self.forward[k];
             self.solve_forwards(problem, k);
             shift2 += (self.forward[k] - rough) * (self.forward[k] - rough);

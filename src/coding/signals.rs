@@ -1,8 +1,8 @@
 //! Signals made ready to be coded, once for however many dictionaries.
 
 use super::CodingError;
-use super::cholesky::long_dot;
 use super::dispatch::{Kernel, fastest};
+use super::dot::dot;
 use super::lasso::column;
 use faer::{Mat, MatRef};
 
@@ -87,7 +87,7 @@ impl Kernel for Norms<'_> {
         let mut norms2 = Vec::with_capacity(self.signals.ncols());
         for i in 0..self.signals.ncols() {
             let signal = column(self.signals, i);
-            norms2.push(long_dot(signal, signal));
+            norms2.push(dot(signal, signal));
         }
         norms2
     }

@@ -14,7 +14,7 @@ use super::RankingError;
 use super::anchors::Anchors;
 use super::score::{PreparedView, combine};
 use crate::cancel::Cancel;
-use crate::coding::{Codes, CodingError, Dictionary, Signals, Workspace, encode_signals};
+use crate::coding::{Codes, CodingError, Dictionary, Signals, encode_signals};
 use crate::parameters::{Channel, Hypothesis};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -38,7 +38,6 @@ struct CoarseView<'a> {
 /// Memory that bounds reuse from class to class.
 #[derive(Default)]
 pub(super) struct BoundMemory {
-    workspace: Workspace,
     residuals: Vec<f64>,
 }
 
@@ -81,7 +80,7 @@ impl<'a> Level<'a> {
                     class: class.to_owned(),
                     channel: view.channel,
                 })?;
-            let codes = encode_signals(&mut memory.workspace, dictionary, &view.signals, lambda, cancel)?;
+            let codes = encode_signals(dictionary, &view.signals, lambda, cancel)?;
             residuals(dictionary, &view.anchors.points, &codes, &mut memory.residuals);
             let bound = dual_value(view.anchors, &memory.residuals);
             match view.hypothesis {

@@ -2,7 +2,7 @@
 
 use super::{RankingError, View};
 use crate::cancel::Cancel;
-use crate::coding::{CodeScore, CodingError, Dictionary, Signals, Workspace, score_signals};
+use crate::coding::{CodeScore, CodingError, Dictionary, Signals, score_signals};
 use crate::parameters::{Channel, Hypothesis, RankBy};
 use faer::MatRef;
 use std::collections::BTreeMap;
@@ -131,7 +131,6 @@ pub fn score(
     label: &str,
     cancel: &Cancel,
 ) -> Result<Score, RankingError> {
-    let mut workspace = Workspace::default();
     let mut plain = None;
     let mut whitened = None;
     let mut doubled = Vec::new();
@@ -147,7 +146,7 @@ pub fn score(
                 class: label.to_owned(),
                 channel: view.channel,
             })?;
-        let codes = score_signals(&mut workspace, dictionary, signals, lambda, cancel)?;
+        let codes = score_signals(dictionary, signals, lambda, cancel)?;
         let errors = Errors::of(&codes, *energy);
         match view.hypothesis {
             Hypothesis::Plain => plain = Some(errors),

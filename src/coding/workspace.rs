@@ -1,0 +1,320 @@
+//! Codes of many signals one after the other, in memory that each thread keeps.
+
+use super::active_set::{ActiveSet, Problem};
+use super::dispatch::{Kernel, fastest};
+use super::dot::dot;
+use super::kkt::coordinate_descent;
+use super::lasso::column;
+use super::scan::pieces;
+use super::screen::ScreenMemory;
+use super::{CodeScore, Codes, CodingError, Dictionary, Signals};
+use crate::cancel::Cancel;
+use std::cell::RefCell;
+use std::ops::Range;
+
+/// Signals per product DᵀS: large enough for the product to run at full speed, small enough for it to stay in cache.
+const BLOCK: usize = 256;
+/// The products of all atoms are computed at once after this share of as many have been computed one by one.
+const SHARE: usize = 64;
+/// Signals between two looks at the cancel flag.
+const CANCEL_EVERY: usize = 32;
+/// Optimality is met to this share of λ (plus the rounding of the products): max_j |d_jᵀ(s − Da)| ≤ λ (1 + 1e-9).
+const KKT_TOLERANCE: f64 = 1e-9;
+/// Coordinate descent, which comes last, may leave this many times as much.
+const FALL_BACK: f64 = 1e3;
+/// Below this share of ‖s‖² the residual is computed in full, because its short form would lose digits.
+const SMALL_RESIDUAL: f64 = 1e-4;
+
+/// Non-zeros whose memory a thread keeps (4 MB).
+const KEPT: usize = 1 << 18;
+
+thread_local! {
+    static WORKSPACE: RefCell<Workspace> = RefCell::default();
+}
+
+/// Memory that coding reuses from call to call; the results do not depend on what it was used for before.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Workspace {
+    screen: ScreenMemory,
+    set: ActiveSet,
+    code: Vec<f64>,
+    residual: Vec<f64>,
+    /// Codes of all signals, one after the other.
+    arena: Vec<(u32, f64)>,
+    /// Where each signal's code ends in `arena`, and what it cost.
+    solved: Vec<(usize, CodeScore)>,
+    /// Products of two atoms that the codes of the run took, about.
+    products: usize,
+}
+
+/// Lends the thread's workspace out.
+///
+/// A query codes its signals under one dictionary after the other. Given back to the system and asked for anew each
+/// time, the memory's page faults would cost as much as a tenth of the arithmetic.
+pub(super) fn with_kept<T>(work: impl FnOnce(&mut Workspace) -> T) -> T {
+    WORKSPACE.with_borrow_mut(|workspace| {
+        let outcome = work(workspace);
+        if workspace.arena.capacity().max(workspace.solved.capacity()) > KEPT {
+            *workspace = Workspace::default();
+        }
+        outcome
+    })
+}
+
+struct CodeBlock<'a> {
+    workspace: &'a mut Workspace,
+    dictionary: &'a Dictionary,
+    signals: &'a Signals<'a>,
+    block: Range<usize>,
+    lambda: f64,
+    cancel: &'a Cancel,
+}
+
+impl Kernel for CodeBlock<'_> {
+    type Output = Result<(), CodingError>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self {
+            workspace,
+            dictionary,
+            signals,
+            block,
+            lambda,
+            cancel,
+        } = self;
+        workspace.code_block(dictionary, signals, block, lambda, cancel)
+    }
+}
+
+impl Workspace {
+    /// Codes all signals.
+    pub fn run(
+        &mut self,
+        dictionary: &Dictionary,
+        signals: &Signals<'_>,
+        lambda: f64,
+        cancel: &Cancel,
+    ) -> Result<(), CodingError> {
+        self.set.reset(dictionary.len());
+        self.arena.clear();
+        self.solved.clear();
+        self.products = 0;
+        for first in (0..signals.len()).step_by(BLOCK) {
+            cancel.check()?;
+            let block = first..signals.len().min(first + BLOCK);
+            dictionary
+                .screen()
+                .correlate(signals, block.clone(), &mut self.screen);
+            fastest(CodeBlock {
+                workspace: self,
+                dictionary,
+                signals,
+                block,
+                lambda,
+                cancel,
+            })?;
+        }
+        Ok(())
+    }
+
+    /// The codes of the last run.
+    pub fn codes(&self) -> Codes {
+        let n = self.solved.len();
+        let mut codes = Codes {
+            offsets: Vec::with_capacity(n + 1),
+            atoms: Vec::with_capacity(self.arena.len()),
+            values: Vec::with_capacity(self.arena.len()),
+            objective: Vec::with_capacity(n),
+            residual2: Vec::with_capacity(n),
+        };
+        codes.offsets.push(0);
+        for &(atom, value) in &self.arena {
+            codes.atoms.push(atom);
+            codes.values.push(value);
+        }
+        for &(end, score) in &self.solved {
+            codes.offsets.push(end);
+            codes.objective.push(score.objective);
+            codes.residual2.push(score.residual2);
+        }
+        codes
+    }
+
+    /// What each signal of the last run cost.
+    pub fn scores(&self) -> Vec<CodeScore> {
+        self.solved.iter().map(|&(_, score)| score).collect()
+    }
+
+    /// Codes the signals `block`, whose correlations are in `screen`.
+    #[inline(always)]
+    fn code_block(
+        &mut self,
+        dictionary: &Dictionary,
+        signals: &Signals<'_>,
+        block: Range<usize>,
+        lambda: f64,
+        cancel: &Cancel,
+    ) -> Result<(), CodingError> {
+        let width = pieces(dictionary.len());
+        let first = block.start;
+        let mut gram = dictionary.known_gram();
+        for i in block {
+            if i % CANCEL_EVERY == 0 {
+                cancel.check()?;
+            }
+            let norm2 = signals.norms2[i];
+            let rough = std::mem::take(&mut self.screen.correlations);
+            if gram.is_none() && self.products > dictionary.len() * dictionary.len() / SHARE {
+                gram = Some(dictionary.gram().as_ref());
+            }
+            let problem = Problem {
+                atoms: dictionary.atoms().as_ref(),
+                squares: dictionary.squares(),
+                gram,
+                rough_gram: &dictionary.screen().gram,
+                rough_gram_error: dictionary.screen().gram_error,
+                signal: signals.signal(i),
+                norm: norm2.sqrt(),
+                rough_correlation: &rough[(i - first) * width..][..width],
+                error: self.screen.errors[i - first],
+                lambda,
+                tolerance: KKT_TOLERANCE * lambda + 1e-14 * norm2.sqrt(),
+            };
+            let start = self.arena.len();
+            let solved = self.set.solve_by_path(&problem);
+            self.products += self.set.path.count * self.set.path.count / 2;
+            if solved {
+                let score = self.path_score(&problem, norm2, i)?;
+                self.solved.push((self.arena.len(), score));
+                self.screen.correlations = rough;
+                continue;
+            }
+            let solved = self.set.solve(&problem);
+            self.products += self.set.atoms.len() * self.set.atoms.len() / 2;
+            if solved {
+                let pairs = self.set.atoms.iter().zip(&self.set.values);
+                // L atoms of M values each are in memory, so their i fits 32 bits.
+                self.arena.extend(pairs.map(|(&j, &a)| (j as u32, a)));
+            } else {
+                self.fall_back(&problem, dictionary, i)?;
+            }
+            let score = self.score(&problem, norm2, start, i)?;
+            self.solved.push((self.arena.len(), score));
+            self.screen.correlations = rough;
+        }
+        Ok(())
+    }
+
+    /// Takes the code over that the path has ended with and says what it costs.
+    #[inline(always)]
+    fn path_score(
+        &mut self,
+        problem: &Problem<'_>,
+        norm2: f64,
+        number: usize,
+    ) -> Result<CodeScore, CodingError> {
+        let path = &self.set.path;
+        let start = self.arena.len();
+        let (mut norm1, mut product) = (0.0, 0.0);
+        for k in 0..path.count {
+            norm1 += path.values[k].abs();
+            product += path.correlations[k] * path.values[k];
+            self.arena.push((path.atoms[k] as u32, path.values[k]));
+        }
+        if path.count > 1 {
+            self.arena[start..].sort_unstable_by_key(|&(j, _)| j);
+        }
+        self.cost(problem, norm2, start, number, norm1, product)
+    }
+
+    /// Sorts the code that starts at `start` and says what it costs.
+    #[inline(always)]
+    fn score(
+        &mut self,
+        problem: &Problem<'_>,
+        norm2: f64,
+        start: usize,
+        number: usize,
+    ) -> Result<CodeScore, CodingError> {
+        let code = &mut self.arena[start..];
+        code.sort_unstable_by_key(|&(j, _)| j);
+        let (mut norm1, mut product) = (0.0, 0.0);
+        for &(j, a) in code.iter() {
+            norm1 += a.abs();
+            product += self.set.correlation(problem, j as usize) * a;
+        }
+        self.cost(problem, norm2, start, number, norm1, product)
+    }
+
+    #[inline(always)]
+    fn cost(
+        &mut self,
+        problem: &Problem<'_>,
+        norm2: f64,
+        start: usize,
+        number: usize,
+        norm1: f64,
+        product: f64,
+    ) -> Result<CodeScore, CodingError> {
+        let code = &self.arena[start..];
+        // At the optimum aᵀGa = cᵀa − λ‖a‖₁.
+        let mut residual2 = norm2 - product - problem.lambda * norm1;
+        if residual2 < SMALL_RESIDUAL * norm2 {
+            self.residual.clear();
+            self.residual.extend_from_slice(problem.signal);
+            for &(j, a) in code.iter() {
+                for (r, d) in self.residual.iter_mut().zip(column(problem.atoms, j as usize)) {
+                    *r -= a * d;
+                }
+            }
+            residual2 = dot(&self.residual, &self.residual);
+        }
+        let score = CodeScore {
+            objective: 0.5 * residual2 + problem.lambda * norm1,
+            residual2,
+            nonzeros: code.len(),
+        };
+        if !score.objective.is_finite() {
+            return Err(CodingError::NotConverged {
+                signal: number,
+                violation: f64::INFINITY,
+            });
+        }
+        Ok(score)
+    }
+
+    /// Where the active set from the neighbour's code failed: once more from nothing, then coordinate descent.
+    #[cold]
+    #[inline(never)]
+    fn fall_back(
+        &mut self,
+        problem: &Problem<'_>,
+        dictionary: &Dictionary,
+        number: usize,
+    ) -> Result<(), CodingError> {
+        let count = dictionary.len();
+        self.set.reset(count);
+        if self.set.solve(problem) {
+            let pairs = self.set.atoms.iter().zip(&self.set.values);
+            self.arena.extend(pairs.map(|(&j, &a)| (j as u32, a)));
+            return Ok(());
+        }
+        self.code.clear();
+        self.code.resize(count, 0.0);
+        for (&j, &a) in self.set.atoms.iter().zip(&self.set.values) {
+            self.code[j] = a;
+        }
+        let violation = coordinate_descent(problem, dictionary.gram().as_ref(), &mut self.code);
+        if violation > FALL_BACK * problem.tolerance {
+            return Err(CodingError::NotConverged {
+                signal: number,
+                violation,
+            });
+        }
+        let code = self.code.iter().enumerate().filter(|(_, a)| **a != 0.0);
+        self.arena.extend(code.map(|(j, &a)| (j as u32, a)));
+        self.set.reset(count);
+        Ok(())
+    }
+}
