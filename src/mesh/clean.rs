@@ -5,6 +5,7 @@ use super::prepare::{Components, PrepareReport};
 use super::trimesh::face_area;
 use super::weld::weld;
 use super::{MeshError, TriangleSoup};
+use crate::cancel::Cancel;
 
 /// A face has no area when it has less than this share of the total.
 const NO_AREA: f64 = 1e-12;
@@ -31,11 +32,12 @@ pub(super) struct Cleaned {
 /// order.
 ///
 /// Errors: [`MeshError::NoFaces`], [`MeshError::IndexOutOfRange`], [`MeshError::NotFinite`] for soups that break
-/// their promise; [`MeshError::Degenerate`] when no face is left.
+/// their promise; [`MeshError::Degenerate`] when no face is left; [`MeshError::Cancelled`] between two steps.
 pub(super) fn clean(
     soup: TriangleSoup,
     keep: Components,
     report: &mut PrepareReport,
+    cancel: &Cancel,
 ) -> Result<Cleaned, MeshError> {
     let TriangleSoup {
         mut vertices,
@@ -45,6 +47,7 @@ pub(super) fn clean(
     report.input_faces = faces.len();
     check(&vertices, &faces)?;
     drop_unreferenced(&mut vertices, &mut faces);
+    cancel.check()?;
     let referenced = vertices.len();
 
     let scale = to_frame(&mut vertices);
@@ -52,13 +55,15 @@ pub(super) fn clean(
         return Err(MeshError::Degenerate);
     }
     let welded = weld(&vertices);
+    cancel.check()?;
     for f in &mut faces {
         *f = f.map(|v| welded.index[v as usize]);
     }
     let mut vertices = welded.vertices;
     report.welded_vertices = referenced - vertices.len();
 
-    let areas = filter_faces(&vertices, &mut faces, report)?;
+    let areas = filter_faces(&vertices, &mut faces, report, cancel)?;
+    cancel.check()?;
     if report.degenerate_faces + report.duplicate_faces > 0 {
         drop_unreferenced(&mut vertices, &mut faces);
     }
@@ -70,6 +75,7 @@ pub(super) fn clean(
         dropped,
         area_dropped,
     } = select(&vertices, faces, &areas, keep);
+    cancel.check()?;
     faces = kept;
     report.components = found;
     report.components_dropped = dropped;
@@ -85,8 +91,13 @@ pub(super) fn clean(
 }
 
 /// The same filters after a simplification, whose counts are not the user's business.
-pub(super) fn clean_again(mesh: &mut Cleaned, keep: Components) -> Result<(), MeshError> {
-    let areas = filter_faces(&mesh.vertices, &mut mesh.faces, &mut PrepareReport::default())?;
+pub(super) fn clean_again(mesh: &mut Cleaned, keep: Components, cancel: &Cancel) -> Result<(), MeshError> {
+    let areas = filter_faces(
+        &mesh.vertices,
+        &mut mesh.faces,
+        &mut PrepareReport::default(),
+        cancel,
+    )?;
     let faces = std::mem::take(&mut mesh.faces);
     mesh.faces = select(&mesh.vertices, faces, &areas, keep).faces;
     drop_unreferenced(&mut mesh.vertices, &mut mesh.faces);
@@ -143,6 +154,7 @@ fn filter_faces(
     vertices: &[[f64; 3]],
     faces: &mut Vec<[u32; 3]>,
     report: &mut PrepareReport,
+    cancel: &Cancel,
 ) -> Result<Vec<f64>, MeshError> {
     let before = faces.len();
     let mut areas: Vec<f64> = faces.iter().map(|f| proper_area(vertices, f)).collect();
@@ -152,6 +164,7 @@ fn filter_faces(
     if faces.is_empty() {
         return Err(MeshError::Degenerate);
     }
+    cancel.check()?;
     let before = faces.len();
     let duplicate = duplicates(vertices.len(), faces);
     retain(faces, &mut areas, |i, _, _| !duplicate[i]);

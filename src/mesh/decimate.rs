@@ -3,6 +3,7 @@
 use super::clean::{Cleaned, clean_again, drop_unreferenced};
 use super::locality::order_along_curve;
 use super::orient::orient;
+use super::pieces::collapse_in_pieces;
 use super::{Components, MeshError};
 use crate::cancel::{Cancel, Cancelled};
 use meshopt::{SimplifyOptions, simplify_decoder, simplify_sloppy_decoder};
@@ -30,7 +31,7 @@ const MARGIN: f64 = 1.1;
 const OUT_OF_CACHE: usize = 20_000;
 
 /// No bound on the error: the target is a size.
-const ANY_ERROR: f32 = 1e3;
+pub(super) const ANY_ERROR: f32 = 1e3;
 
 /// Reduces a mesh to at most `working_size` vertices; 0 leaves it as it is. Near-linear in the number of faces.
 ///
@@ -74,13 +75,13 @@ pub(super) fn simplify_to(
     ];
     for (options, outcome) in steps {
         collapse(mesh, size, options, cancel)?;
-        clean_again(mesh, keep)?;
+        clean_again(mesh, keep, cancel)?;
         if mesh.vertices.len() <= size {
             return Ok(outcome);
         }
     }
     cluster(mesh, size);
-    clean_again(mesh, keep)?;
+    clean_again(mesh, keep, cancel)?;
     Ok(Simplified::ByClustering)
 }
 
@@ -95,6 +96,7 @@ fn collapse(
     options: SimplifyOptions,
     cancel: &Cancel,
 ) -> Result<(), Cancelled> {
+    collapse_in_pieces(mesh, 2 * size, options, cancel)?;
     let mut faces_per_vertex = 2.0;
     for round in 0..ROUNDS {
         let (v, f) = (mesh.vertices.len(), mesh.faces.len());
@@ -148,7 +150,7 @@ fn cluster(mesh: &mut Cleaned, size: usize) {
     }
 }
 
-fn single_precision(vertices: &[[f64; 3]]) -> Vec<[f32; 3]> {
+pub(super) fn single_precision(vertices: &[[f64; 3]]) -> Vec<[f32; 3]> {
     vertices.iter().map(|p| p.map(|x| x as f32)).collect()
 }
 

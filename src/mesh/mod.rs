@@ -15,6 +15,7 @@ mod locality;
 pub mod obj;
 pub mod off;
 pub mod orient;
+mod pieces;
 pub mod ply;
 pub mod prepare;
 pub mod read;

@@ -108,8 +108,8 @@ pub fn prepare(soup: TriangleSoup, options: &PrepareOptions) -> Result<(TriMesh,
     prepare_until(soup, options, &Cancel::new())
 }
 
-/// As [`prepare`], for a caller that may ask to stop. The flag is looked at between the steps; of these, one round of
-/// collapses of a large mesh takes the longest.
+/// As [`prepare`], for a caller that may ask to stop. The flag is looked at between the steps; large meshes are
+/// simplified in pieces, and between these, too.
 ///
 /// Errors: those of [`prepare`], and [`MeshError::Cancelled`].
 pub fn prepare_until(
@@ -118,7 +118,7 @@ pub fn prepare_until(
     cancel: &Cancel,
 ) -> Result<(TriMesh, PrepareReport), MeshError> {
     let mut report = PrepareReport::default();
-    let mut mesh = clean(soup, options.components, &mut report)?;
+    let mut mesh = clean(soup, options.components, &mut report, cancel)?;
     cancel.check()?;
     let mut census = edge_census(mesh.vertices.len(), &mesh.faces);
     report.non_manifold_edges = census.non_manifold;

@@ -1,7 +1,9 @@
 //! Down to the working size: the size is met, the shape is kept, also across holes and bad topology.
 
 use crate::shapes::*;
+use shapelex::cancel::Cancel;
 use shapelex::mesh::{PrepareOptions, TriMesh, TriangleSoup, prepare};
+use shapelex::spectral::{EigenOptions, assemble, smallest_eigenpairs};
 use std::time::Instant;
 
 /// Distance from a point to a triangle (Ericson 2005, section 5.1.5, by regions).
@@ -57,14 +59,55 @@ fn a_surface_keeps_its_area_and_place() {
     assert!(distance < 0.006, "{distance}");
 }
 
-#[test]
-fn a_million_vertices() {
-    let mut soup = globe(1000, 1000);
+/// A globe of mountains and valleys.
+fn rough_globe(side: u32) -> TriangleSoup {
+    let mut soup = globe(side, side);
     for p in &mut soup.vertices {
         let [x, y, z] = *p;
         let r = 1.0 + 0.2 * (5.0 * x).sin() * (4.0 * y).cos() + 0.1 * (7.0 * z).sin();
         *p = [r * x, r * y, r * z];
     }
+    soup
+}
+
+#[test]
+fn a_surface_simplified_in_pieces_keeps_its_area_place_and_spectrum() {
+    let soup = rough_globe(300);
+    let (fine, fine_report) = prepare_full(soup.clone());
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap()
+            .install(|| prepare(soup.clone(), &PrepareOptions::default()).unwrap())
+    };
+    let (coarse, report) = on(1);
+    assert_prepared(&coarse, &report);
+    assert!((1990..=2000).contains(&report.vertices), "{}", report.vertices);
+    assert_eq!((report.boundary_edges, report.non_manifold_edges), (0, 0));
+    assert_eq!(report.faces, 2 * report.vertices - 4, "still a sphere");
+    assert_eq!(on(2), (coarse.clone(), report.clone()), "whatever the threads");
+    let ratio = report.area / fine_report.area;
+    let distance = one_sided_distance(&fine, &coarse, 100);
+    assert!((0.99..1.001).contains(&ratio), "{ratio}");
+    assert!(distance < 0.01, "{distance}");
+    let spectrum = |mesh: &TriMesh| {
+        let operators = assemble(mesh).unwrap();
+        let pairs = smallest_eigenpairs(&operators, 21, &EigenOptions::default(), &Cancel::new());
+        pairs.unwrap().values
+    };
+    // A mesh of 10 000 vertices stands for the surface itself, whose solve would take seconds.
+    let options = PrepareOptions {
+        working_size: 10_000,
+        ..Default::default()
+    };
+    let (finer, _) = prepare(soup.clone(), &options).unwrap();
+    for (k, (a, b)) in spectrum(&coarse).iter().zip(spectrum(&finer)).enumerate().skip(1) {
+        assert!((a / b - 1.0).abs() < 0.01, "{k}: {a} {b}");
+    }
+}
+
+#[test]
+fn a_million_vertices() {
+    let soup = rough_globe(1000);
     let clock = Instant::now();
     let (mesh, report) = prepare(soup, &PrepareOptions::default()).unwrap();
     eprintln!(
