@@ -4,6 +4,7 @@
 //! products of a projection then stream contiguous memory once, for the vectors of two blocks together. Rows, columns and vectors meet in registers only: eight rows of the block, or of the result, against
 //! one number of the basis. A general matrix product would copy the basis first.
 
+use super::rows::Rows;
 use super::scratch::Scratch;
 use super::simd::{Row, Simd, Vector, kernel, load, store};
 use faer::linalg::matmul::matmul;
@@ -12,17 +13,23 @@ use faer::{Accum, MatMut, MatRef, Par};
 /// Rows per panel.
 const WIDTH: usize = 8;
 
-/// Panels put in column-major order together for the product with a general matrix.
+/// Panels put in column-major order together for the product with a general matrix, and their rows.
 const TOGETHER: usize = 24;
+const GROUP: usize = TOGETHER * WIDTH;
 
 /// A column of a panel.
 type Eight = [f64; WIDTH];
 
-/// n × capacity, of which the first `columns` columns are in use.
+/// n × m, in chunks of columns: a basis that outgrows its first room gets more beside it, and nothing is moved.
 pub struct Basis {
     n: usize,
-    capacity: usize,
     most: usize,
+    chunks: Vec<Chunk>,
+}
+
+struct Chunk {
+    capacity: usize,
+    /// Columns in use.
     columns: usize,
     /// Panel by panel; in each, capacity columns of WIDTH numbers. Rows beyond n are zero in the columns in use.
     values: Scratch,
@@ -31,53 +38,44 @@ pub struct Basis {
 impl Basis {
     /// Room for `most` columns of n, at first for `expected` of them.
     pub fn new(n: usize, expected: usize, most: usize) -> Self {
-        let capacity = expected.min(most);
         Self {
             n,
-            capacity,
             most,
-            columns: 0,
-            values: Scratch::new(n.div_ceil(WIDTH) * capacity * WIDTH),
+            chunks: vec![Chunk::new(n, expected.min(most))],
         }
     }
 
     /// Columns in use.
     pub fn columns(&self) -> usize {
-        self.columns
+        self.chunks.iter().map(|chunk| chunk.columns).sum()
     }
 
     /// Whether `more` columns fit.
     pub fn has_room(&self, more: usize) -> bool {
-        self.columns + more <= self.most
+        self.columns() + more <= self.most
     }
 
     /// Appends the B columns of a block.
     pub fn append<const B: usize>(&mut self, block: &[[f64; B]]) {
-        if self.columns + B > self.capacity {
-            self.grow(B);
+        // A block lies in one chunk.
+        if self.last().columns + B > self.last().capacity {
+            let more = (self.chunks[0].capacity / 8).min(self.most.saturating_sub(self.columns()));
+            self.chunks.push(Chunk::new(self.n, more.next_multiple_of(B).max(B)));
         }
-        self.columns += B;
+        self.last().columns += B;
         self.overwrite_last(block);
     }
 
-    /// Room for at least `more` columns, up to a quarter of what there is.
-    fn grow(&mut self, more: usize) {
-        let capacity = (self.capacity + self.capacity / 4)
-            .min(self.most)
-            .max(self.columns + more);
-        let mut values = Scratch::new(self.n.div_ceil(WIDTH) * capacity * WIDTH);
-        let used = self.columns * WIDTH;
-        for (new, old) in values.chunks_exact_mut(capacity * WIDTH).zip(self.panels()) {
-            new[..used].copy_from_slice(&old.as_flattened()[..used]);
-        }
-        self.values = values;
-        self.capacity = capacity;
+    fn last(&mut self) -> &mut Chunk {
+        let last = self.chunks.len() - 1;
+        &mut self.chunks[last]
     }
 
     /// Replaces the last B columns.
     pub fn overwrite_last<const B: usize>(&mut self, block: &[[f64; B]]) {
-        let first = self.columns - B;
-        let panels = self.values.chunks_exact_mut(self.capacity * WIDTH);
+        let chunk = self.last();
+        let first = chunk.columns - B;
+        let panels = chunk.values.chunks_exact_mut(chunk.capacity * WIDTH);
         for (panel, rows) in panels.zip(block.chunks(WIDTH)) {
             for (k, column) in panel.as_chunks_mut::<WIDTH>().0[first..first + B]
                 .iter_mut()
@@ -90,65 +88,98 @@ impl Basis {
         }
     }
 
-    /// The panels, one row of WIDTH numbers per column.
-    fn panels(&self) -> impl Iterator<Item = &[Eight]> {
-        self.values.as_chunks::<WIDTH>().0.chunks_exact(self.capacity)
-    }
-
     /// P ← P − V (VᵀP) over the first `columns` columns; returns the largest |VᵀP|.
     pub fn project_out<const W: usize>(&self, simd: Simd, columns: usize, block: &mut [[f64; W]]) -> f64
     where
         [f64; W]: Row,
     {
         let mut h = vec![[0.0; W]; columns];
-        inner_products::<W>(simd, self, block, &mut h);
-        subtract_products::<W>(simd, self, block, &h);
+        let mut rest = &mut h[..];
+        for chunk in &self.chunks {
+            let part = rest
+                .split_off_mut(..chunk.columns.min(rest.len()))
+                .unwrap_or_default();
+            inner_products::<W>(simd, chunk, block, part);
+        }
+        let mut rest = &h[..];
+        for chunk in &self.chunks {
+            let part = rest
+                .split_off(..chunk.columns.min(rest.len()))
+                .unwrap_or_default();
+            subtract_products::<W>(simd, chunk, block, part);
+        }
         h.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()))
     }
 
-    /// V Y for all columns in use: n × k, row by row; row i goes to place `order[i]`.
-    pub fn times(&self, y: MatRef<'_, f64>, order: &[usize]) -> Scratch {
-        const ROWS: usize = TOGETHER * WIDTH;
-        let k = y.ncols();
-        let mut x = Scratch::new(self.n * k);
-        // Column-major for the product, and its result before its rows are put in their places.
-        let mut v = Scratch::new(ROWS * self.columns);
-        let mut product = Scratch::new(ROWS * k);
-        let mut panels = self.panels();
-        for places in order.chunks(ROWS) {
-            for (p, panel) in panels.by_ref().take(TOGETHER).enumerate() {
-                for (column, to) in panel[..self.columns].iter().zip(v.chunks_exact_mut(ROWS)) {
-                    to[p * WIDTH..(p + 1) * WIDTH].copy_from_slice(column);
-                }
+    /// V Y for all columns in use: n × k, k at most the first chunk's columns; row i is called `order[i]`. The result
+    /// takes the place of the basis, as a second matrix of its size would be the peak of a solve's memory.
+    pub fn times(mut self, y: MatRef<'_, f64>, order: &[usize]) -> Rows {
+        let (columns, k) = (self.columns(), y.ncols());
+        let mut first = self.chunks.remove(0);
+        // Column-major for the product.
+        let mut v = Scratch::new(GROUP * columns);
+        let stride = TOGETHER * WIDTH * first.capacity;
+        for (g, group) in first.values.chunks_mut(stride).enumerate() {
+            let mut to = v.chunks_exact_mut(GROUP);
+            gather(group, first.capacity, first.columns, &mut to);
+            for chunk in &self.chunks {
+                let stride = TOGETHER * WIDTH * chunk.capacity;
+                let part = &chunk.values[g * stride..chunk.values.len().min((g + 1) * stride)];
+                gather(part, chunk.capacity, chunk.columns, &mut to);
             }
+            let rows = group.len() / first.capacity;
             matmul(
-                MatMut::from_row_major_slice_mut(&mut product, ROWS, k),
+                MatMut::from_row_major_slice_mut(&mut group[..rows * k], rows, k),
                 Accum::Replace,
-                MatRef::from_column_major_slice(&v, ROWS, self.columns),
+                MatRef::from_column_major_slice_with_stride(&v, rows, columns, GROUP),
                 y,
                 1.0,
                 Par::Seq,
             );
-            for (row, &place) in product.chunks_exact(k).zip(places) {
-                x[place * k..(place + 1) * k].copy_from_slice(row);
-            }
         }
-        x
+        Rows::new(first.values, k, stride, order)
+    }
+}
+
+/// Puts the columns in use of some panels in column-major order, each to the next place of `to`.
+fn gather<'a>(panels: &[f64], capacity: usize, columns: usize, to: &mut impl Iterator<Item = &'a mut [f64]>) {
+    for (c, to) in to.take(columns).enumerate() {
+        for (panel, to) in panels
+            .chunks_exact(capacity * WIDTH)
+            .zip(to.as_chunks_mut::<WIDTH>().0)
+        {
+            *to = panel.as_chunks().0[c];
+        }
+    }
+}
+
+impl Chunk {
+    fn new(n: usize, capacity: usize) -> Self {
+        Self {
+            capacity,
+            columns: 0,
+            values: Scratch::new(n.div_ceil(WIDTH) * capacity * WIDTH),
+        }
+    }
+
+    /// The panels, one row of WIDTH numbers per column.
+    fn panels(&self) -> impl Iterator<Item = &[Eight]> {
+        self.values.as_chunks::<WIDTH>().0.chunks_exact(self.capacity)
     }
 }
 
 kernel! {
     /// H ← H + VᵀP.
-    fn inner_products<const W: usize>(basis: &Basis, block: &[[f64; W]], h: &mut [[f64; W]]) => inner_products_body
+    fn inner_products<const W: usize>(basis: &Chunk, block: &[[f64; W]], h: &mut [[f64; W]]) => inner_products_body
 }
 
 kernel! {
     /// P ← P − V H.
-    fn subtract_products<const W: usize>(basis: &Basis, block: &mut [[f64; W]], h: &[[f64; W]]) => subtract_products_body
+    fn subtract_products<const W: usize>(basis: &Chunk, block: &mut [[f64; W]], h: &[[f64; W]]) => subtract_products_body
 }
 
 #[inline(always)]
-fn inner_products_body<V: Vector, const W: usize>(basis: &Basis, block: &[[f64; W]], h: &mut [[f64; W]]) {
+fn inner_products_body<V: Vector, const W: usize>(basis: &Chunk, block: &[[f64; W]], h: &mut [[f64; W]]) {
     for (panel, rows) in basis.panels().zip(block.chunks(WIDTH)) {
         let mut p = [V::splat(0.0); WIDTH];
         for (p, row) in p.iter_mut().zip(rows) {
@@ -165,7 +196,7 @@ fn inner_products_body<V: Vector, const W: usize>(basis: &Basis, block: &[[f64; 
 }
 
 #[inline(always)]
-fn subtract_products_body<V: Vector, const W: usize>(basis: &Basis, block: &mut [[f64; W]], h: &[[f64; W]]) {
+fn subtract_products_body<V: Vector, const W: usize>(basis: &Chunk, block: &mut [[f64; W]], h: &[[f64; W]]) {
     for (panel, rows) in basis.panels().zip(block.chunks_mut(WIDTH)) {
         let mut p = [V::splat(0.0); WIDTH];
         for (p, row) in p.iter_mut().zip(rows.iter()) {
@@ -213,7 +244,7 @@ mod tests {
             let y = faer::Mat::from_fn(12, 3, |i, j| if i == 4 * j { 1.0 } else { 0.0 });
             let order: Vec<usize> = (0..n).map(|i| n - 1 - i).collect();
             let x = basis.times(y.as_ref(), &order);
-            assert!((0..n).all(|i| (0..3).all(|j| x[order[i] * 3 + j] == cosine(i, 4 * j))));
+            assert!((0..n).all(|i| (0..3).all(|j| x.row(order[i])[j] == cosine(i, 4 * j))));
         }
     }
 }

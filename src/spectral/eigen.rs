@@ -1,6 +1,7 @@
 //! The n smallest eigenpairs of W φ = λ A φ (method, step 3).
 
 use super::normalised::Normalised;
+use super::rows::Rows;
 use super::solve::{self, ZERO};
 use super::{Operators, SpectralError};
 use crate::cancel::Cancel;
@@ -88,18 +89,23 @@ pub(super) fn eigenpairs_of(
         for (slot, &value) in values[zeros..].iter_mut().zip(&pairs.values) {
             *slot = if value > floor { value } else { 0.0 };
         }
-        let signs = signs(s, &pairs.vectors, wanted);
+        let signs = signs(s, &pairs.vectors);
         // From rows to columns in tiles that stay in the first-level cache.
         const TILE: usize = 16;
-        for (tile, rows) in pairs.vectors.chunks(TILE * wanted).enumerate() {
-            let scales = &s.inv_sqrt_mass[tile * TILE..];
+        for first in (0..s.n).step_by(TILE) {
+            let tile = first..s.n.min(first + TILE);
+            let rows: [&[f64]; TILE] = std::array::from_fn(|t| {
+                if first + t < s.n {
+                    pairs.vectors.row(first + t)
+                } else {
+                    &[]
+                }
+            });
+            let scales = &s.inv_sqrt_mass[tile.clone()];
             for (k, sign) in signs.iter().enumerate() {
-                let column = vectors
-                    .col_mut(zeros + k)
-                    .subrows_mut(tile * TILE, rows.len() / wanted);
-                let values = rows[k..].iter().step_by(wanted).zip(scales);
-                for (slot, (x, scale)) in column.iter_mut().zip(values) {
-                    *slot = sign * x * scale;
+                let column = vectors.col_mut(zeros + k).subrows_mut(first, tile.len());
+                for ((slot, row), scale) in column.iter_mut().zip(&rows).zip(scales) {
+                    *slot = sign * row[k] * scale;
                 }
             }
         }
@@ -113,10 +119,10 @@ pub(super) fn eigenpairs_of(
 }
 
 /// ±1 per column, so that the entry of φ of largest magnitude (the first of equals) becomes positive.
-fn signs(s: &Normalised, x: &[f64], k: usize) -> Vec<f64> {
-    let mut largest = vec![0.0f64; k];
-    for (row, scale) in x.chunks_exact(k).zip(&s.inv_sqrt_mass) {
-        for (best, v) in largest.iter_mut().zip(row) {
+fn signs(s: &Normalised, x: &Rows) -> Vec<f64> {
+    let mut largest = vec![0.0f64; x.width()];
+    for (i, scale) in s.inv_sqrt_mass.iter().enumerate() {
+        for (best, v) in largest.iter_mut().zip(x.row(i)) {
             let v = v * scale;
             // A hair of preference for the earlier vertex keeps symmetric shapes from flipping on rounding.
             if v.abs() > best.abs() * (1.0 + 1e-6) {

@@ -14,6 +14,7 @@ use super::dense;
 use super::loss::Loss;
 use super::near::{Near, products, subtract, subtract_last};
 use super::normalised::NullSpace;
+use super::rows::Rows;
 use super::scratch::Scratch;
 use super::shift_invert::Factor;
 use super::simd::{Row, Simd};
@@ -287,25 +288,33 @@ where
         Ok(Ritz { theta, vectors, tail })
     }
 
-    /// Eigenvectors of S for the chosen Ritz pairs: n × k, row by row, unit columns; row i goes to place `order[i]`.
+    /// The basis alone; all else is freed.
+    pub fn into_basis(self) -> Basis {
+        self.basis
+    }
+}
+
+impl Ritz {
+    /// Eigenvectors of S for the chosen Ritz pairs of `basis`: n × k, unit columns; row i is called `order[i]`.
     ///
     /// Each is OP applied to the Ritz vector over its Ritz value, which costs no further solve because the recurrence
     /// knows OP V: x = V y + V_{m+1} (R_last y_last) / θ.
-    pub fn vectors(&self, ritz: &Ritz, chosen: &[usize], order: &[usize]) -> Scratch {
-        let (m, k) = (self.dimension(), chosen.len());
-        let mut y = Mat::<f64>::zeros(m + B, k);
+    pub fn vectors(&self, basis: Basis, chosen: &[usize], order: &[usize]) -> Rows {
+        let (m, k) = (self.vectors.nrows(), chosen.len());
+        let block = self.tail.nrows();
+        let mut y = Mat::<f64>::zeros(m + block, k);
         for (q, &c) in chosen.iter().enumerate() {
-            let tail = ritz.tail.col(c);
-            let relative = tail.norm_l2() / ritz.theta[c];
+            let tail = self.tail.col(c);
+            let relative = tail.norm_l2() / self.theta[c];
             let unit = 1.0 / relative.mul_add(relative, 1.0).sqrt();
             for i in 0..m {
-                y[(i, q)] = ritz.vectors[(i, c)] * unit;
+                y[(i, q)] = self.vectors[(i, c)] * unit;
             }
-            for i in 0..B {
-                y[(m + i, q)] = tail[i] / ritz.theta[c] * unit;
+            for i in 0..block {
+                y[(m + i, q)] = tail[i] / self.theta[c] * unit;
             }
         }
-        self.basis.times(y.as_ref(), order)
+        basis.times(y.as_ref(), order)
     }
 }
 

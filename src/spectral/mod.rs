@@ -17,6 +17,7 @@ mod near;
 mod normalised;
 mod parts;
 mod residual;
+mod rows;
 mod scratch;
 mod shift_invert;
 mod simd;

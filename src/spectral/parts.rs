@@ -5,7 +5,7 @@
 //! wide: dozens of equal pieces are beyond it. This is the way out.
 
 use super::normalised::Normalised;
-use super::scratch::Scratch;
+use super::rows::Rows;
 use super::solve::Pairs;
 use super::{EigenOptions, SpectralError};
 use crate::cancel::Cancel;
@@ -13,7 +13,7 @@ use crate::cancel::Cancel;
 /// What was found of one part: values ascending, vectors row by row.
 struct Found {
     values: Vec<f64>,
-    vectors: Scratch,
+    vectors: Rows,
     /// Whether there is no more that could be wanted.
     all: bool,
 }
@@ -39,7 +39,7 @@ pub fn smallest_by_parts(
         let most = wanted.min(part.len() - block.null.count);
         let count = count.min(most);
         let (values, vectors) = match count {
-            0 => (Vec::new(), Scratch::default()),
+            0 => (Vec::new(), Rows::default()),
             _ => {
                 let pairs = solve(&block, count, options, cancel)?;
                 (pairs.values, pairs.vectors)
@@ -89,9 +89,8 @@ fn assemble(
     let wanted = merged.len();
     let mut vectors = vec![0.0; n * wanted];
     for (column, &(_, p, k)) in merged.iter().enumerate() {
-        let width = found[p].values.len();
         for (row, &vertex) in parts[p].iter().enumerate() {
-            vectors[vertex * wanted + column] = found[p].vectors[row * width + k];
+            vectors[vertex * wanted + column] = found[p].vectors.row(row)[k];
         }
     }
     (merged.iter().map(|m| m.0).collect(), vectors)

@@ -1,6 +1,7 @@
 //! The check every answer passes before it is returned: residual of each pair, orthonormality of all.
 
 use super::normalised::Normalised;
+use super::rows::{BLOCK, Rows};
 use super::simd::{Simd, dispatch, fused};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
@@ -21,12 +22,12 @@ pub struct Check {
     pub orthogonality: f64,
 }
 
-/// Measures the pairs: `x` is n × k, row by row, in the order of `s`.
+/// Measures the pairs: `x` is n × k, rows by their places in `s`.
 ///
 /// In terms of φ = A^(-1/2) x the residual is ‖Wφ − λAφ‖_{A⁻¹} / (λ ‖φ‖_A). The Gram matrix itself would cost as much
 /// as assembling the vectors; for random signs g, E‖(XᵀX − I) g‖² = ‖XᵀX − I‖_F² (Hutchinson 1990), and eight draws
 /// find any defect to within a small factor.
-pub fn check(s: &Normalised, values: &[f64], x: &[f64], floor: f64) -> Check {
+pub fn check(s: &Normalised, values: &[f64], x: &Rows, floor: f64) -> Check {
     let k = values.len();
     let mut squares = vec![0.0; k];
     let mut row = vec![0.0; k];
@@ -50,13 +51,13 @@ pub fn check(s: &Normalised, values: &[f64], x: &[f64], floor: f64) -> Check {
     Check {
         residual,
         excess,
-        orthogonality: orthogonality(s, x, k),
+        orthogonality: orthogonality(s, x),
     }
 }
 
 dispatch! {
     fn squared_residuals(
-        s: &Normalised, values: &[f64], x: &[f64], row: &mut [f64], squares: &mut [f64],
+        s: &Normalised, values: &[f64], x: &Rows, row: &mut [f64], squares: &mut [f64],
     ) => squared_residuals_body
 }
 
@@ -64,17 +65,16 @@ dispatch! {
 fn squared_residuals_body<const FMA: bool>(
     s: &Normalised,
     values: &[f64],
-    x: &[f64],
+    x: &Rows,
     row: &mut [f64],
     squares: &mut [f64],
 ) {
-    let k = values.len();
     for j in 0..s.n {
-        for ((r, v), y) in row.iter_mut().zip(values).zip(&x[j * k..(j + 1) * k]) {
+        for ((r, v), y) in row.iter_mut().zip(values).zip(x.row(j)) {
             *r = -v * y;
         }
         for (i, value) in s.column(j) {
-            for (r, y) in row.iter_mut().zip(&x[i * k..(i + 1) * k]) {
+            for (r, y) in row.iter_mut().zip(x.row(i)) {
                 *r = fused::<FMA>(value, *y, *r);
             }
         }
@@ -84,35 +84,40 @@ fn squared_residuals_body<const FMA: bool>(
     }
 }
 
-fn orthogonality(s: &Normalised, x: &[f64], k: usize) -> f64 {
+fn orthogonality(s: &Normalised, x: &Rows) -> f64 {
+    let k = x.width();
     let mut rng = ChaCha8Rng::seed_from_u64(0x0123_4567);
     let signs = Mat::<f64>::from_fn(k, PROBES, |_, _| if rng.random::<bool>() { 1.0 } else { -1.0 });
-    let x = MatRef::from_row_major_slice(x, s.n, k);
-    let mut y = vec![0.0; s.n * PROBES];
-    matmul(
-        MatMut::from_row_major_slice_mut(&mut y, s.n, PROBES),
-        Accum::Replace,
-        x,
-        signs.as_ref(),
-        1.0,
-        Par::Seq,
-    );
     let mut defect = signs.clone();
-    matmul(
-        defect.as_mut(),
-        Accum::Add,
-        x.transpose(),
-        MatRef::from_row_major_slice(&y, s.n, PROBES),
-        -1.0,
-        Par::Seq,
-    );
     // Against the null space: NᵀX g, one number per null vector and probe.
     let mut against_null = vec![0.0; s.null.count * PROBES];
-    for (i, row) in y.chunks_exact(PROBES).enumerate() {
-        let label = s.null.label[i];
-        if label != u32::MAX {
-            for (sum, v) in against_null[label as usize * PROBES..].iter_mut().zip(row) {
-                *sum += s.null.entry[i] * v;
+    let mut y = [0.0; BLOCK * PROBES];
+    for (block, names) in x.blocks() {
+        let rows = names.len();
+        let block = MatRef::from_row_major_slice(block, rows, k);
+        let y = &mut y[..rows * PROBES];
+        matmul(
+            MatMut::from_row_major_slice_mut(y, rows, PROBES),
+            Accum::Replace,
+            block,
+            signs.as_ref(),
+            1.0,
+            Par::Seq,
+        );
+        matmul(
+            defect.as_mut(),
+            Accum::Add,
+            block.transpose(),
+            MatRef::from_row_major_slice(y, rows, PROBES),
+            -1.0,
+            Par::Seq,
+        );
+        for (&i, row) in names.iter().zip(y.chunks_exact(PROBES)) {
+            let label = s.null.label[i];
+            if label != u32::MAX {
+                for (sum, v) in against_null[label as usize * PROBES..].iter_mut().zip(row) {
+                    *sum += s.null.entry[i] * v;
+                }
             }
         }
     }

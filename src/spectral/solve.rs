@@ -4,12 +4,13 @@
 //! (S − c I)⁻¹ then has eigenvalues of both signs and only one end with unwanted neighbours, and a third less subspace
 //! converges than with a shift below zero.
 
+use super::basis::Basis;
 use super::dense;
 use super::lanczos::{Lanczos, Ritz};
 use super::normalised::{Normalised, NullSpace};
 use super::parts::smallest_by_parts;
 use super::residual::{self, Check};
-use super::scratch::Scratch;
+use super::rows::Rows;
 use super::shift_invert::{Analysis, Factor};
 use super::simd::Row;
 use super::{EigenOptions, SpectralError};
@@ -21,8 +22,8 @@ use rand_chacha::ChaCha8Rng;
 pub struct Pairs {
     /// Ascending.
     pub values: Vec<f64>,
-    /// n × k, row by row, in the order of S.
-    pub vectors: Scratch,
+    /// n × k, rows by their places in S.
+    pub vectors: Rows,
     pub check: Check,
 }
 
@@ -91,12 +92,13 @@ pub fn estimated_bytes(n: usize, wanted: usize) -> usize {
     let m = first_subspace(n, wanted, block) + wanted / 16;
     // The factor of a surface mesh has about 5 log2(n) entries per row, held twice while it is packed; S and its
     // permuted copy take another 40 numbers per row.
-    let factor = 8 * n * (10 * n.ilog2() as usize + 40);
+    let factor = 8 * n * 10 * n.ilog2() as usize;
     // Projected problem: T, its eigenvectors, workspace, coefficients.
     let projected = 8 * 5 * m * m;
-    // First the basis with the row-major vectors, then those with the result.
+    // The basis with the factor, then with the result.
     let basis = 8 * n * (m + 8 * block);
-    factor + projected + vectors + basis.max(vectors)
+    let operator = 8 * n * 40;
+    projected + operator + basis + factor.max(vectors)
 }
 
 /// The `wanted` smallest eigenpairs outside the null space, checked.
@@ -113,7 +115,7 @@ pub fn smallest(
     // More equal pieces than the widest block finds copies of an eigenvalue.
     if parts.len() > BLOCKS[BLOCKS.len() - 1] {
         let (values, vectors) = smallest_by_parts(s, &parts, wanted, options, cancel, whole)?;
-        return accept(s, (values, vectors.into()), options.tolerance);
+        return accept(s, (values, Rows::in_order(vectors, wanted)), options.tolerance);
     }
     whole(s, wanted, options, cancel)
 }
@@ -143,7 +145,7 @@ fn whole(
     Err(SpectralError::NotConverged { detail: reason })
 }
 
-fn accept(s: &Normalised, pairs: (Vec<f64>, Scratch), tolerance: f64) -> Result<Pairs, SpectralError> {
+fn accept(s: &Normalised, pairs: (Vec<f64>, Rows), tolerance: f64) -> Result<Pairs, SpectralError> {
     let (values, vectors) = pairs;
     let floor = ZERO * values.last().copied().unwrap_or(0.0);
     let check = residual::check(s, &values, &vectors, floor);
@@ -165,7 +167,7 @@ fn accept(s: &Normalised, pairs: (Vec<f64>, Scratch), tolerance: f64) -> Result<
 
 fn dense_pairs(s: &Normalised, wanted: usize, options: &EigenOptions) -> Result<Pairs, SpectralError> {
     let (values, vectors) = dense::smallest(s, wanted)?;
-    accept(s, (values, vectors.into()), options.tolerance)
+    accept(s, (values, Rows::in_order(vectors, wanted)), options.tolerance)
 }
 
 fn sparse_pairs(
@@ -179,12 +181,12 @@ fn sparse_pairs(
     let order = analysis.order();
     let null = s.null.permuted(&order);
     let (shift, factor) = choose_shift(&analysis, wanted, s.null.count, cancel)?;
+    let mut factor = Some(factor);
     let problem = Problem {
         s,
         null: &null,
         order: &order,
         analysis: &analysis,
-        factor: &factor,
         shift,
         wanted,
         options,
@@ -193,10 +195,10 @@ fn sparse_pairs(
     let mut last = None;
     for &block in blocks(s.n) {
         let attempt = match block {
-            4 => problem.attempt::<4>(),
-            8 => problem.attempt::<8>(),
-            16 => problem.attempt::<16>(),
-            _ => problem.attempt::<32>(),
+            4 => problem.attempt::<4>(&mut factor),
+            8 => problem.attempt::<8>(&mut factor),
+            16 => problem.attempt::<16>(&mut factor),
+            _ => problem.attempt::<32>(&mut factor),
         };
         match attempt {
             Ok(pairs) => return Ok(pairs),
@@ -281,7 +283,6 @@ struct Problem<'a> {
     null: &'a NullSpace,
     order: &'a [usize],
     analysis: &'a Analysis,
-    factor: &'a Factor,
     shift: f64,
     wanted: usize,
     options: &'a EigenOptions,
@@ -289,8 +290,36 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Runs the recurrence until the wanted pairs have converged, then checks them and their number.
-    fn attempt<const B: usize>(&self) -> Result<Pairs, SpectralError>
+    /// Runs the recurrence until the wanted pairs have converged, then checks them and their number. Takes the factor
+    /// of S − shift I, and gives it back where the recurrence fails; it is freed before the vectors are assembled.
+    fn attempt<const B: usize>(&self, kept: &mut Option<Factor>) -> Result<Pairs, SpectralError>
+    where
+        [f64; B]: Row,
+    {
+        let factor = match kept.take() {
+            Some(factor) => factor,
+            None => self.analysis.factorise(self.shift)?,
+        };
+        let found = self.converge::<B>(&factor);
+        let (basis, ritz, chosen) = match found {
+            Ok(found) => found,
+            Err(error) => {
+                *kept = Some(factor);
+                return Err(error);
+            }
+        };
+        drop(factor);
+        let wanted = &chosen[..self.wanted];
+        let values = wanted.iter().map(|&i| self.value(ritz.theta[i])).collect();
+        let vectors = ritz.vectors(basis, wanted, self.order);
+        let pairs = accept(self.s, (values, vectors), self.options.tolerance)?;
+        self.cancel.check()?;
+        self.certify(&ritz, &chosen)?;
+        Ok(pairs)
+    }
+
+    /// Runs the recurrence until the wanted pairs have converged: the basis, Ritz pairs, and their places by value.
+    fn converge<const B: usize>(&self, factor: &Factor) -> Result<(Basis, Ritz, Vec<usize>), SpectralError>
     where
         [f64; B]: Row,
     {
@@ -299,7 +328,7 @@ impl Problem<'_> {
         let capacity = (2 * first).min(available);
         let accepted = 0.3 * self.options.tolerance;
         let rng = ChaCha8Rng::seed_from_u64(self.options.seed);
-        let mut lanczos = Lanczos::<B>::new(self.s.n, self.factor, self.null, first, capacity, rng)?;
+        let mut lanczos = Lanczos::<B>::new(self.s.n, factor, self.null, first, capacity, rng)?;
         let mut next_look = first;
         loop {
             self.cancel.check()?;
@@ -329,16 +358,7 @@ impl Problem<'_> {
                 let last = self.value(ritz.theta[chosen[self.wanted - 1]]);
                 worst = self.worst(&ritz, chosen[..self.wanted].iter().copied(), last);
                 if worst <= accepted {
-                    let values = chosen[..self.wanted]
-                        .iter()
-                        .map(|&i| self.value(ritz.theta[i]))
-                        .collect();
-                    let vectors = lanczos.vectors(&ritz, &chosen[..self.wanted], self.order);
-                    drop(lanczos);
-                    let pairs = accept(self.s, (values, vectors), self.options.tolerance)?;
-                    self.cancel.check()?;
-                    self.certify(&ritz, &chosen)?;
-                    return Ok(pairs);
+                    return Ok((lanczos.into_basis(), ritz, chosen));
                 }
             }
             if full {
@@ -360,7 +380,7 @@ impl Problem<'_> {
         self.shift + 1.0 / theta
     }
 
-    /// Estimated relative residual of a Ritz pair after the free step of [`Lanczos::vectors`]: ‖r‖ / (θ² λ).
+    /// Estimated relative residual of a Ritz pair after the free step of [`Ritz::vectors`]: ‖r‖ / (θ² λ).
     fn estimate(&self, ritz: &Ritz, i: usize, floor: f64) -> f64 {
         let theta = ritz.theta[i];
         ritz.tail.col(i).norm_l2() / (theta * theta) / self.value(theta).max(floor)
