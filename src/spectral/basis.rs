@@ -60,7 +60,8 @@ impl Basis {
         // A block lies in one chunk.
         if self.last().columns + B > self.last().capacity {
             let more = (self.chunks[0].capacity / 8).min(self.most.saturating_sub(self.columns()));
-            self.chunks.push(Chunk::new(self.n, more.next_multiple_of(B).max(B)));
+            self.chunks
+                .push(Chunk::new(self.n, more.next_multiple_of(B).max(B)));
         }
         self.last().columns += B;
         self.overwrite_last(block);
