@@ -3,6 +3,7 @@
 //! column, so that both sides work on the same numbers. Run by `benches/peers/run`; without input it does nothing.
 
 use faer::Mat;
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use shapelex::cancel::Cancel;
 use shapelex::coding::{Dictionary, LearnParameters, encode, learn};
@@ -143,29 +144,19 @@ impl State {
         Ok(json!({}))
     }
 
-    /// Codes the signals again and again, as a query does under one class after the other; with several threads, as many
-    /// at a time. The median of the calls.
+    /// Codes the signals so many times, as a query does under its classes, on all threads; the time of one of them.
     fn lasso(&mut self, command: &Value) -> Outcome {
         let dictionary = self.dictionary.as_ref().ok_or("no dictionary")?;
         let signals = self.signals.as_ref().ok_or("no signals")?;
-        let lambda = number(command, "lambda")?;
-        let threads = rayon::current_num_threads();
+        let (lambda, calls) = (number(command, "lambda")?, number(command, "calls")? as usize);
         let call = || encode(dictionary, signals.as_ref(), lambda, &Cancel::new());
-        let mut times = Vec::new();
-        for _ in 0..number(command, "calls")? as usize {
-            let started = Instant::now();
-            let outcomes = rayon::iter::ParallelIterator::map(
-                rayon::iter::IntoParallelIterator::into_par_iter(0..threads),
-                |_| call().map(|_| ()),
-            );
-            rayon::iter::ParallelIterator::collect::<Result<Vec<()>, _>>(outcomes)?;
-            times.push(milliseconds(started) / threads as f64);
-        }
-        times.sort_by(f64::total_cmp);
+        let started = Instant::now();
+        (0..calls).into_par_iter().try_for_each(|_| call().map(drop))?;
+        let ms = milliseconds(started) / calls as f64;
         let codes = call()?;
         let objective: f64 = codes.objective.iter().sum();
         let nonzeros = codes.values.len() as f64 / codes.objective.len() as f64;
-        Ok(json!({ "ms": times[times.len() / 2], "objective": objective, "nonzeros": nonzeros }))
+        Ok(json!({ "ms": ms, "objective": objective, "nonzeros": nonzeros }))
     }
 
     /// Loads an index of one dictionary per class, each a file.
@@ -193,11 +184,10 @@ impl State {
         let parameters = parameters(command)?;
         let classes = command["classes"].as_array().ok_or("classes")?;
         let started = Instant::now();
-        let indexed = rayon::iter::IntoParallelRefIterator::par_iter(classes);
-        let classes: Result<Vec<IndexedClass>, String> =
-            rayon::iter::ParallelIterator::collect(rayon::iter::ParallelIterator::map(indexed, |class| {
-                index_class(class, &parameters).map_err(|e| e.to_string())
-            }));
+        let classes: Result<Vec<IndexedClass>, String> = classes
+            .par_iter()
+            .map(|class| index_class(class, &parameters).map_err(|e| e.to_string()))
+            .collect();
         let index = Index {
             classes: classes?,
             parameters,
