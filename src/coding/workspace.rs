@@ -14,7 +14,7 @@ use std::ops::Range;
 
 /// Signals per product DᵀS: large enough for the product to run at full speed, small enough for it to stay in cache.
 const BLOCK: usize = 256;
-/// The products of all atoms are computed at once after this share of as many have been computed one by one.
+/// All products of atoms are computed at once when a 64th of their number have been computed one by one.
 const SHARE: usize = 64;
 /// Signals between two looks at the cancel flag.
 const CANCEL_EVERY: usize = 32;
@@ -49,8 +49,8 @@ pub(super) struct Workspace {
 
 /// Lends the thread's workspace out.
 ///
-/// A query codes its signals under one dictionary after the other. Given back to the system and asked for anew each
-/// time, the memory's page faults would cost as much as a tenth of the arithmetic.
+/// A query codes its signals under one dictionary after the other, for a fraction of a millisecond each; memory given
+/// back to the system and asked for anew costs page faults.
 pub(super) fn with_kept<T>(work: impl FnOnce(&mut Workspace) -> T) -> T {
     WORKSPACE.with_borrow_mut(|workspace| {
         let outcome = work(workspace);
