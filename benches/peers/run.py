@@ -192,7 +192,7 @@ def eigen(table, ours, peer, zoo, scratch, label, quick):
         a, b = ours(), peer()
         size = a(op="operators", mesh=mesh, out=str(scratch))["vertices"]
         b(op="operators", dir=str(scratch))
-        rounds = 1 if size > 50_000 else 3 if size > 10_000 or quick else 5
+        rounds = 1 if size > (20_000 if quick else 50_000) else 3 if size > 10_000 or quick else 5
         table.measure(
             f"200 eigenpairs, {size} vertices ({name}), {label}", rounds,
             lambda: a(op="eigen", n=200, values=str(scratch / "ours")),
