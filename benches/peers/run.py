@@ -203,7 +203,7 @@ def eigen(table, ours, peer, zoo, scratch, label, quick):
 
 def coding(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
     class_meshes = next(iter(zoo.values()))
-    helper, judging = ours(), peer()
+    describing, judging = ours(), peer()
     settings = [("default", "sqrt_unit", 128), ("paper", "unit", 500), ("paper", "raw", 500)]
     for preset, normalisation, atoms in settings:
         parts = []
@@ -212,7 +212,7 @@ def coding(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
             # A query is coded at every vertex, a training shape at the preset's sample.
             whole = {"samples": 0} if i == len(class_meshes[:5]) - 1 else {}
             describe = dict(mesh=mesh, preset=preset, normalisation=normalisation, signals=str(path), **whole)
-            rows, _ = helper(op="describe", **describe)["shape"]
+            rows, _ = describing(op="describe", **describe)["shape"]
             parts.append(path)
         held_out = scratch / "held_out"
         held_out.write_bytes(parts[-1].read_bytes()[: 1500 * rows * 8])

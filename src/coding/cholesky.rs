@@ -110,6 +110,11 @@ impl Factor {
             // SAFETY: the function needs nothing but AVX-512F, which was just detected.
             return unsafe { super::wide_factor::solve_lower(&self.rows, &self.inverse_diagonal, x) };
         }
+        self.solve_lower_portably(x);
+    }
+
+    #[inline(always)]
+    fn solve_lower_portably(&self, x: &mut [f64]) {
         for i in 0..x.len() {
             let (done, rest) = x.split_at_mut(i);
             rest[0] = self.solve_row(i, done, rest[0]);
@@ -131,6 +136,11 @@ impl Factor {
             // SAFETY: the function needs nothing but AVX-512F, which was just detected.
             return unsafe { super::wide_factor::solve_upper(&self.rows, &self.inverse_diagonal, x) };
         }
+        self.solve_upper_portably(x);
+    }
+
+    #[inline(always)]
+    fn solve_upper_portably(&self, x: &mut [f64]) {
         for i in (0..x.len()).rev() {
             let (before, rest) = x.split_at_mut(i);
             let value = rest[0] * self.inverse_diagonal[i];
@@ -184,6 +194,22 @@ mod tests {
             factor.remove(k);
         }
         assert_eq!(factor.len(), 13);
+    }
+
+    #[test]
+    fn all_forms_of_the_solves_give_the_same_to_the_last_bit() {
+        let (mut factor, mut kept) = (Factor::default(), Vec::new());
+        for size in 0..35 {
+            let b: Vec<f64> = (0..size).map(|i| (1.7 * f64::from(i)).sin()).collect();
+            let (mut fast, mut portable) = (b.clone(), b);
+            factor.solve_lower(&mut fast);
+            factor.solve_lower_portably(&mut portable);
+            assert_eq!(fast, portable, "{size}");
+            factor.solve_upper(&mut fast);
+            factor.solve_upper_portably(&mut portable);
+            assert_eq!(fast, portable, "{size}");
+            push(&mut factor, &mut kept, 3 * size as usize);
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! products of a projection then stream contiguous memory once, for the vectors of two blocks together. Rows, columns and vectors meet in registers only: eight rows of the block, or of the result, against
 //! one number of the basis. A general matrix product would copy the basis first.
 
-use super::rows::Rows;
+use super::rows::{BLOCK, Rows};
 use super::scratch::Scratch;
 use super::simd::{Row, Simd, Vector, kernel, load, store};
 use faer::linalg::matmul::matmul;
@@ -13,9 +13,8 @@ use faer::{Accum, MatMut, MatRef, Par};
 /// Rows per panel.
 const WIDTH: usize = 8;
 
-/// Panels put in column-major order together for the product with a general matrix, and their rows.
-const TOGETHER: usize = 24;
-const GROUP: usize = TOGETHER * WIDTH;
+/// Panels whose rows make a block of the result.
+const TOGETHER: usize = BLOCK / WIDTH;
 
 /// A column of a panel.
 type Eight = [f64; WIDTH];
@@ -118,10 +117,10 @@ impl Basis {
         let (columns, k) = (self.columns(), y.ncols());
         let mut first = self.chunks.remove(0);
         // Column-major for the product.
-        let mut v = Scratch::new(GROUP * columns);
+        let mut v = Scratch::new(BLOCK * columns);
         let stride = TOGETHER * WIDTH * first.capacity;
         for (g, group) in first.values.chunks_mut(stride).enumerate() {
-            let mut to = v.chunks_exact_mut(GROUP);
+            let mut to = v.chunks_exact_mut(BLOCK);
             gather(group, first.capacity, first.columns, &mut to);
             for chunk in &self.chunks {
                 let stride = TOGETHER * WIDTH * chunk.capacity;
@@ -132,7 +131,7 @@ impl Basis {
             matmul(
                 MatMut::from_row_major_slice_mut(&mut group[..rows * k], rows, k),
                 Accum::Replace,
-                MatRef::from_column_major_slice_with_stride(&v, rows, columns, GROUP),
+                MatRef::from_column_major_slice_with_stride(&v, rows, columns, BLOCK),
                 y,
                 1.0,
                 Par::Seq,

@@ -2,6 +2,9 @@
 
 use super::scratch::Scratch;
 
+/// Rows of a block: a product of so many rows of a basis by its coefficients runs at full speed, and stays in cache.
+pub const BLOCK: usize = 192;
+
 /// n × k values, row by row, in blocks of rows with a gap behind each.
 #[derive(Debug, Default)]
 pub struct Rows {
@@ -14,9 +17,6 @@ pub struct Rows {
     /// Where the row of each name starts.
     starts: Vec<usize>,
 }
-
-/// Rows of a block.
-pub const BLOCK: usize = 192;
 
 impl Rows {
     /// Rows of `width` values, [`BLOCK`] of them from every `stride`-th value on; the i-th is called `names[i]`, and the

@@ -92,7 +92,8 @@ pub fn estimated_bytes(n: usize, wanted: usize) -> usize {
         return 8 * 4 * n * n + 2 * vectors;
     }
     let block = blocks(n)[0];
-    let m = first_subspace(n, wanted, block) + wanted / 16;
+    // The first room of the basis, and as much as it grows by at a time.
+    let m = first_subspace(n, wanted, block) * 9 / 8;
     // The factor of a surface mesh has about 5 log2(n) entries per row, held twice while it is packed; S and its
     // permuted copy take another 40 numbers per row.
     let factor = 8 * n * 10 * n.ilog2() as usize;
