@@ -165,7 +165,7 @@ pub fn answer(
 fn spectrum_bytes(soup: &TriangleSoup, parameters: &Parameters) -> u64 {
     let vertices = match parameters.working_size {
         0 => soup.vertices.len(),
-        // Simplification may stop above its goal, so some room is left.
+        // Closing holes adds a vertex for each.
         size => soup.vertices.len().min(size.saturating_mul(2)),
     };
     spectral::estimated_bytes(vertices, parameters.eigenpairs) as u64

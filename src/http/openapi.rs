@@ -319,6 +319,7 @@ const MESH: &[Code] = &[
     Code::NoFaces,
     Code::MeshTooSmall,
     Code::DegenerateMesh,
+    Code::NotSimplified,
     Code::MeshTooLarge,
     Code::InvalidMesh,
     Code::SpectrumFailed,

@@ -38,6 +38,9 @@ impl From<MeshError> for Problem {
                 .with("vertices", vertices)
                 .with("faces", faces),
             MeshError::Degenerate => of(Code::DegenerateMesh),
+            MeshError::NotSimplified { vertices, size } => of(Code::NotSimplified)
+                .with("vertices", vertices)
+                .with("size", size),
             MeshError::TooLarge { what, found, limit } => of(Code::MeshTooLarge)
                 .with("what", what)
                 .with("found", found)

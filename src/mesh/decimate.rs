@@ -30,10 +30,14 @@ const MARGIN: f64 = 1.1;
 /// Larger meshes do not fit the cache, so it pays to bring neighbours together first.
 const OUT_OF_CACHE: usize = 20_000;
 
+/// The coarsest grid that keeps a face has eight cells, and one vertex for each.
+const SMALLEST: usize = 8;
+
 /// No bound on the error: the target is a size.
 pub(super) const ANY_ERROR: f32 = 1e3;
 
-/// Reduces a mesh to at most `working_size` vertices; 0 leaves it as it is. Near-linear in the number of faces.
+/// Reduces a mesh to at most `working_size` vertices (less than 8 count as 8); 0 leaves it as it is. Near-linear in the
+/// number of faces.
 ///
 /// The result's vertices are a subset of the input's, at their full precision; only the choice of collapses is made
 /// in single precision, within the mesh's unit frame. Collapses first keep to the topology, then go across
@@ -44,7 +48,7 @@ pub(super) const ANY_ERROR: f32 = 1e3;
 /// loses 1–1.5 % of the area. The result is cleaned again. A mesh whose neighbouring faces do not all run
 /// the same way (not `oriented`) is oriented first.
 ///
-/// Errors: [`MeshError::Degenerate`] when nothing with an area is left; [`MeshError::Cancelled`].
+/// Errors: [`MeshError::NotSimplified`] when no face with an area would be left; [`MeshError::Cancelled`].
 pub(super) fn simplify_to(
     mesh: &mut Cleaned,
     working_size: usize,
@@ -52,13 +56,16 @@ pub(super) fn simplify_to(
     oriented: bool,
     cancel: &Cancel,
 ) -> Result<Simplified, MeshError> {
-    if working_size == 0 || mesh.vertices.len() <= working_size {
+    if working_size == 0 {
+        return Ok(Simplified::No);
+    }
+    let before = mesh.vertices.len();
+    let size = working_size.max(SMALLEST);
+    if before <= size {
         return Ok(Simplified::No);
     }
     cancel.check()?;
-    // Fewer than four vertices are not a mesh.
-    let size = working_size.max(4);
-    if mesh.vertices.len() > OUT_OF_CACHE {
+    if before > OUT_OF_CACHE {
         order_along_curve(&mut mesh.vertices, &mut mesh.faces);
         cancel.check()?;
     }
@@ -66,6 +73,13 @@ pub(super) fn simplify_to(
         orient(mesh.vertices.len(), &mut mesh.faces);
         cancel.check()?;
     }
+    let tidy = |mesh: &mut Cleaned| match clean_again(mesh, keep, cancel) {
+        Err(MeshError::Degenerate) => Err(MeshError::NotSimplified {
+            vertices: before,
+            size,
+        }),
+        other => other,
+    };
     let steps = [
         (SimplifyOptions::RegularizeLight, Simplified::ByCollapse),
         (
@@ -75,21 +89,22 @@ pub(super) fn simplify_to(
     ];
     for (options, outcome) in steps {
         collapse(mesh, size, options, cancel)?;
-        clean_again(mesh, keep, cancel)?;
+        tidy(mesh)?;
         if mesh.vertices.len() <= size {
             return Ok(outcome);
         }
     }
-    cluster(mesh, size);
-    clean_again(mesh, keep, cancel)?;
+    cluster(mesh, size, cancel)?;
+    tidy(mesh)?;
     Ok(Simplified::ByClustering)
 }
 
 /// Edge collapses until at most `size` vertices are left or no collapse is possible.
 ///
 /// The library counts faces, we count vertices. A collapse inside takes two faces with its vertex, one on a border a
-/// single face, and how many of each there will be is not known. So the first round, which does the work, aims a
-/// tenth above the size, and the later ones approach it with the measured faces per vertex.
+/// single face, a face on its own has three vertices, and how many of each there will be is not known. So the first
+/// round, which does the work, aims a tenth above the size, and the later ones approach it with the measured faces per
+/// vertex.
 fn collapse(
     mesh: &mut Cleaned,
     size: usize,
@@ -120,34 +135,45 @@ fn collapse(
             options,
             None,
         );
-        adopt(mesh, &result);
-        let removed = v - mesh.vertices.len();
-        if removed == 0 {
+        if result.is_empty() || result.len() == indices.len() {
             return Ok(());
         }
-        faces_per_vertex = ((f - mesh.faces.len()) as f64 / removed as f64).clamp(1.0, 2.0);
+        adopt(mesh, &result);
+        let removed = (v - mesh.vertices.len()).max(1);
+        faces_per_vertex = ((f - mesh.faces.len()) as f64 / removed as f64).clamp(1.0 / 3.0, 2.0);
     }
     Ok(())
 }
 
-/// Vertex clustering, with fewer faces each time until the size is met.
-fn cluster(mesh: &mut Cleaned, size: usize) {
-    let mut target = 2 * size;
-    while mesh.vertices.len() > size && target >= 2 {
-        let indices: Vec<u32> = mesh.faces.iter().flatten().copied().collect();
-        let result = simplify_sloppy_decoder(
-            &indices,
-            &single_precision(&mesh.vertices),
-            3 * target.min(mesh.faces.len()),
-            ANY_ERROR,
-            None,
-        );
-        if result.is_empty() {
-            return;
+/// Vertex clustering on the finest grid that leaves at most `size` vertices. The library is asked for faces, of which
+/// a vertex may have any number here, so their number is searched for.
+fn cluster(mesh: &mut Cleaned, size: usize, cancel: &Cancel) -> Result<(), Cancelled> {
+    let indices: Vec<u32> = mesh.faces.iter().flatten().copied().collect();
+    let positions = single_precision(&mesh.vertices);
+    let mut best = Vec::new();
+    let (mut low, mut high) = (1, mesh.faces.len());
+    while low <= high {
+        cancel.check()?;
+        let target = low.midpoint(high);
+        let result = simplify_sloppy_decoder(&indices, &positions, 3 * target, ANY_ERROR, None);
+        if distinct(&result, positions.len()) <= size {
+            best = result;
+            low = target + 1;
+        } else {
+            high = target - 1;
         }
-        adopt(mesh, &result);
-        target = target * 3 / 4;
     }
+    adopt(mesh, &best);
+    Ok(())
+}
+
+/// How many of `n` vertices an index list names.
+fn distinct(indices: &[u32], n: usize) -> usize {
+    let mut seen = vec![false; n];
+    indices
+        .iter()
+        .filter(|&&v| !std::mem::replace(&mut seen[v as usize], true))
+        .count()
 }
 
 pub(super) fn single_precision(vertices: &[[f64; 3]]) -> Vec<[f32; 3]> {

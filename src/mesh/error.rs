@@ -47,6 +47,11 @@ pub enum MeshError {
     /// All faces have zero area.
     #[error("every face is degenerate (zero area or repeated vertices)")]
     Degenerate,
+    /// Simplification to the working size would leave no face with an area.
+    #[error(
+        "the mesh cannot be simplified from {vertices} to {size} vertices, as too many of its faces are thin or apart; raise working_size or set it to 0"
+    )]
+    NotSimplified { vertices: usize, size: usize },
     /// More than the limits allow.
     #[error("the mesh has {found} {what}, more than the limit of {limit}")]
     TooLarge {

@@ -37,7 +37,7 @@ pub struct PrepareOptions {
     pub components: Components,
     /// Close boundary loops with a perimeter below this many times √area; 0 closes none.
     pub fill_holes_below: f64,
-    /// Simplify meshes with more vertices than this; 0 never does.
+    /// Simplify meshes with more vertices than this, or than 8; 0 never does.
     pub working_size: usize,
 }
 
@@ -103,7 +103,7 @@ pub struct PrepareReport {
 ///
 /// Errors: [`MeshError::NoFaces`] for points only, [`MeshError::NotFinite`] and [`MeshError::IndexOutOfRange`] for
 /// soups that break their promise, [`MeshError::Degenerate`] when no face has an area, [`MeshError::TooSmall`] when
-/// fewer than 4 vertices or 2 faces are left.
+/// fewer than 4 vertices or 2 faces are left, [`MeshError::NotSimplified`] when the working size would leave nothing.
 pub fn prepare(soup: TriangleSoup, options: &PrepareOptions) -> Result<(TriMesh, PrepareReport), MeshError> {
     prepare_until(soup, options, &Cancel::new())
 }

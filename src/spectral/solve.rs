@@ -45,7 +45,8 @@ const BEYOND: usize = 8;
 
 /// Block sizes in the order they are tried. Small blocks need the smallest subspace; a block finds at most its own size
 /// of copies of an eigenvalue in exact arithmetic, so larger ones follow when the count does not come out.
-const BLOCKS: [usize; 4] = [4, 8, 16, 32];
+const BLOCKS: [usize; 4] = [4, 8, 16, WIDEST];
+const WIDEST: usize = 32;
 
 /// By how much the shift of an attempt differs from that of the one before.
 const NEXT_SHIFT: f64 = 1.013;
@@ -112,41 +113,48 @@ pub fn smallest(
     options: &EigenOptions,
     cancel: &Cancel,
 ) -> Result<Pairs, SpectralError> {
-    if is_dense(s.n, wanted) {
-        return dense_pairs(s, wanted, options);
-    }
-    let parts = s.parts();
     // More equal pieces than the widest block finds copies of an eigenvalue.
-    if parts.len() > BLOCKS[BLOCKS.len() - 1] {
-        let (values, vectors) = smallest_by_parts(s, &parts, wanted, options, cancel, whole)?;
-        return accept(s, (values, Rows::in_order(vectors, wanted)), options.tolerance);
+    if !is_dense(s.n, wanted) {
+        let parts = s.parts();
+        if parts.len() > WIDEST {
+            let (values, vectors) = smallest_by_parts(s, &parts, wanted, options, cancel, whole)?;
+            return accept(s, (values, Rows::in_order(vectors, wanted)), options.tolerance);
+        }
     }
     whole(s, wanted, options, cancel)
 }
 
-/// As [`smallest`], by one solve.
+/// As [`smallest`], by one solve: densely or sparsely, and where that fails by the other way, if it has a chance. The
+/// dense solver is right to some 10⁴ units in the last place of ‖S‖, which thin triangles make large.
 fn whole(
     s: &Normalised,
     wanted: usize,
     options: &EigenOptions,
     cancel: &Cancel,
 ) -> Result<Pairs, SpectralError> {
-    if is_dense(s.n, wanted) {
-        return dense_pairs(s, wanted, options);
-    }
-    let mut reason = match sparse_pairs(s, wanted, options, cancel) {
-        Ok(pairs) => return Ok(pairs),
-        Err(SpectralError::Cancelled(c)) => return Err(c.into()),
-        Err(other) => other.to_string(),
+    type Way<'a> = &'a dyn Fn() -> Result<Pairs, SpectralError>;
+    let dense = || dense_pairs(s, wanted, options);
+    let sparse = || sparse_pairs(s, wanted, options, cancel);
+    let (first, last): (Way<'_>, Option<Way<'_>>) = if is_dense(s.n, wanted) {
+        // The subspace needs room for more than the pairs, and for two blocks of any width.
+        let room = s.n - s.null.count >= (wanted + 2 * BLOCKS[0]).max(2 * WIDEST);
+        (&dense, room.then_some(&sparse))
+    } else {
+        (&sparse, (s.n <= DENSE_LAST_RESORT).then_some(&dense))
     };
-    if s.n <= DENSE_LAST_RESORT {
+    let mut details = Vec::new();
+    for way in std::iter::once(first).chain(last) {
         cancel.check()?;
-        match dense_pairs(s, wanted, options) {
+        match way() {
             Ok(pairs) => return Ok(pairs),
-            Err(other) => reason = format!("{reason}; dense: {other}"),
+            Err(SpectralError::Cancelled(c)) => return Err(c.into()),
+            Err(SpectralError::NotConverged { detail }) => details.push(detail),
+            Err(other) => details.push(other.to_string()),
         }
     }
-    Err(SpectralError::NotConverged { detail: reason })
+    Err(SpectralError::NotConverged {
+        detail: details.join("; "),
+    })
 }
 
 fn accept(s: &Normalised, pairs: (Vec<f64>, Rows), tolerance: f64) -> Result<Pairs, SpectralError> {

@@ -252,7 +252,7 @@ proptest! {
         if let Ok((mesh, report)) = prepare(TriangleSoup { vertices, faces }, &options) {
             assert_prepared(&mesh, &report);
             if working_size > 0 {
-                prop_assert!(report.vertices <= working_size.max(4));
+                prop_assert!(report.vertices <= working_size.max(8));
             }
             if let Ok(white) = whiten(&mesh) {
                 prop_assert!((white.area() - 1.0).abs() < 1e-9);

@@ -1,6 +1,8 @@
 //! Down to the working size: the size is met, the shape is kept, also across holes and bad topology.
 
 use crate::shapes::*;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use shapelex::cancel::Cancel;
 use shapelex::mesh::{PrepareOptions, TriMesh, TriangleSoup, prepare};
 use shapelex::spectral::{EigenOptions, assemble, smallest_eigenpairs};
@@ -161,6 +163,50 @@ fn an_open_surface_keeps_its_boundary_length() {
     eprintln!("openness {:.4} → {:.4}", fine.openness, coarse.openness);
     assert!((coarse.openness / fine.openness - 1.0).abs() < 0.1);
     assert!((1950..=2000).contains(&coarse.vertices), "{}", coarse.vertices);
+}
+
+/// Shapes that no collapse, or no grid, takes to the working size by the usual number of faces per vertex.
+#[test]
+fn needles_and_random_faces_meet_the_size() {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let anywhere =
+        |rng: &mut ChaCha8Rng| -> [f64; 3] { std::array::from_fn(|_| rng.random_range(-1.0..1.0)) };
+    let mut star = TriangleSoup {
+        vertices: vec![[0.0; 3]],
+        faces: Vec::new(),
+    };
+    let mut chain = star.clone();
+    let mut last = 0;
+    for _ in 0..5000 {
+        let p = anywhere(&mut rng);
+        let k = star.vertices.len() as u32;
+        for (needles, tip) in [(&mut star, 0), (&mut chain, last)] {
+            needles.vertices.extend([p, [p[0] + 1e-2, p[1], p[2]]]);
+            needles.faces.push([tip, k, k + 1]);
+        }
+        last = k;
+    }
+    let n = 10_000;
+    let random = TriangleSoup {
+        vertices: (0..n).map(|_| anywhere(&mut rng)).collect(),
+        faces: (0..3 * n)
+            .map(|_| std::array::from_fn(|_| rng.random_range(0..n)))
+            .collect(),
+    };
+    for (name, soup) in [("star", star), ("chain", chain), ("random", random)] {
+        for working_size in [5, 50, 1500] {
+            let options = PrepareOptions {
+                working_size,
+                ..PrepareOptions::default()
+            };
+            let (mesh, report) = prepare(soup.clone(), &options).unwrap_or_else(|e| panic!("{name}: {e}"));
+            eprintln!("{name} to {working_size}: {}", report.vertices);
+            assert_prepared(&mesh, &report);
+            assert!(report.vertices <= working_size.max(8), "{name}");
+            // A chain that loses links falls apart, and the largest part is kept.
+            assert!(name == "chain" || 8 * report.vertices >= working_size, "{name}");
+        }
+    }
 }
 
 #[test]

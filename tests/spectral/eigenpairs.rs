@@ -1,8 +1,13 @@
 //! Eigenpairs: golden values, analytic spectra, invariances, hard inputs.
 
 use crate::support::*;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use shapelex::cancel::Cancel;
+use shapelex::mesh::whiten::whiten;
+use shapelex::mesh::{PrepareOptions, TriangleSoup, prepare};
 use shapelex::spectral::{EigenOptions, SpectralError, assemble, smallest_eigenpairs};
+use std::f64::consts::PI;
 use std::path::Path;
 
 fn golden_facts() -> serde_json::Value {
@@ -260,5 +265,63 @@ fn an_unlucky_shift_is_left_for_another() {
         let pairs = smallest_eigenpairs(&operators, 61, &EigenOptions::default(), &Cancel::new());
         let pairs = pairs.unwrap_or_else(|error| panic!("{vertex}: {error}"));
         assert_sound(&operators, &pairs);
+    }
+}
+
+/// A sphere of 24 meridians and 12 rings of faces, most of whose vertices were pulled close to a neighbour.
+fn needles(seed: u64) -> TriangleSoup {
+    const MERIDIANS: usize = 24;
+    const RINGS: usize = 12;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut vertices = vec![[0.0, 0.0, 1.0]];
+    for ring in 1..RINGS {
+        for meridian in 0..MERIDIANS {
+            let (theta, phi) = (
+                PI * ring as f64 / RINGS as f64,
+                2.0 * PI * meridian as f64 / MERIDIANS as f64,
+            );
+            let r = 1.0 + 0.2 * (3.0 * theta).sin() * phi.cos();
+            vertices.push([
+                r * theta.sin() * phi.cos(),
+                r * theta.sin() * phi.sin(),
+                r * theta.cos(),
+            ]);
+        }
+    }
+    vertices.push([0.0, 0.0, -1.0]);
+    let at = |ring: usize, meridian: usize| (1 + (ring - 1) * MERIDIANS + meridian % MERIDIANS) as u32;
+    let last = (vertices.len() - 1) as u32;
+    let mut faces = Vec::new();
+    for j in 0..MERIDIANS {
+        faces.push([0, at(1, j), at(1, j + 1)]);
+        faces.push([last, at(RINGS - 1, j + 1), at(RINGS - 1, j)]);
+    }
+    for i in 1..RINGS - 1 {
+        for j in 0..MERIDIANS {
+            faces.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            faces.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    for _ in 0..100 + 20 * (seed % 3) {
+        let [a, b, _] = faces[rng.random_range(0..faces.len())].map(|v| v as usize);
+        let t = 10f64.powf(-rng.random_range(1.0..7.0));
+        vertices[a] = std::array::from_fn(|c| vertices[b][c] + t * (vertices[a][c] - vertices[b][c]));
+    }
+    TriangleSoup { vertices, faces }
+}
+
+#[test]
+fn what_the_dense_solver_gets_wrong_the_sparse_one_finds() {
+    for seed in [1055, 1067, 1099, 1139, 1295, 1319, 1379] {
+        let (mesh, report) = prepare(needles(seed), &PrepareOptions::default()).unwrap();
+        assert!(report.vertices < 300, "so many go to the sparse solver first");
+        for mesh in [whiten(&mesh).unwrap(), mesh] {
+            let operators = assemble(&mesh).unwrap();
+            let pairs = smallest_eigenpairs(&operators, 200, &EigenOptions::default(), &Cancel::new());
+            let pairs = pairs.unwrap_or_else(|error| panic!("{seed}: {error}"));
+            assert_eq!(pairs.values.len(), 200);
+            // Entries of ‖S‖ of 10⁷ and more leave rounding errors above the tolerance in the residual.
+            assert!(verify(&operators, &pairs).1 <= 1e-7, "{seed}");
+        }
     }
 }
