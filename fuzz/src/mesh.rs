@@ -1,7 +1,7 @@
 //! Bytes → mesh → prepared mesh, as one format or as whatever they look like.
 
 use shapelex::mesh::{
-    Components, Format, Limits, PrepareOptions, Source, TriangleSoup, prepare, read, read_poses,
+    Components, Format, Limits, PrepareOptions, Source, TriMesh, TriangleSoup, prepare, read, read_poses,
 };
 
 /// Small, so that an input is done in milliseconds.
@@ -53,7 +53,8 @@ fn check_soup(soup: TriangleSoup) {
             .flatten()
             .fold(1.0, |e: f64, x| e.max(x.abs()));
         let rounding = 1e-14 * extent * extent;
-        let area = mesh.area();
+        let anew = TriMesh::new(mesh.vertices().to_vec(), mesh.faces().to_vec(), usize::MAX);
+        let area = anew.expect("what was prepared is a mesh").area();
         assert!(
             (area - 1.0).abs() < 1e-9 + rounding,
             "area {area} of extent {extent}"
