@@ -58,7 +58,7 @@ impl Basis {
     pub fn append<const B: usize>(&mut self, block: &[[f64; B]]) {
         // A block lies in one chunk.
         if self.last().columns + B > self.last().capacity {
-            let more = (self.chunks[0].capacity / 8).min(self.most.saturating_sub(self.columns()));
+            let more = (self.chunks[0].capacity / 16).min(self.most.saturating_sub(self.columns()));
             self.chunks
                 .push(Chunk::new(self.n, more.next_multiple_of(B).max(B)));
         }
@@ -118,18 +118,18 @@ impl Basis {
         let mut first = self.chunks.remove(0);
         // Column-major for the product.
         let mut v = Scratch::new(BLOCK * columns);
-        let stride = TOGETHER * WIDTH * first.capacity;
-        for (g, group) in first.values.chunks_mut(stride).enumerate() {
+        for g in 0..self.n.div_ceil(BLOCK) {
             let mut to = v.chunks_exact_mut(BLOCK);
-            gather(group, first.capacity, first.columns, &mut to);
-            for chunk in &self.chunks {
+            for chunk in std::iter::once(&first).chain(&self.chunks) {
                 let stride = TOGETHER * WIDTH * chunk.capacity;
                 let part = &chunk.values[g * stride..chunk.values.len().min((g + 1) * stride)];
                 gather(part, chunk.capacity, chunk.columns, &mut to);
             }
-            let rows = group.len() / first.capacity;
+            let rows = BLOCK.min(self.n - g * BLOCK);
+            // Behind what is already done, and before what is still to be read.
+            let to = &mut first.values[g * BLOCK * k..][..rows * k];
             matmul(
-                MatMut::from_row_major_slice_mut(&mut group[..rows * k], rows, k),
+                MatMut::from_row_major_slice_mut(to, rows, k),
                 Accum::Replace,
                 MatRef::from_column_major_slice_with_stride(&v, rows, columns, BLOCK),
                 y,
@@ -137,7 +137,8 @@ impl Basis {
                 Par::Seq,
             );
         }
-        Rows::new(first.values, k, stride, order)
+        first.values.shrink_to(self.n * k);
+        Rows::new(first.values, k, order)
     }
 }
 

@@ -76,6 +76,11 @@ pub(super) fn eigenpairs_of(
     let zeros = s.null.count.min(n);
     let wanted = n - zeros;
     let mut values = vec![0.0; n];
+    let pairs = match wanted {
+        0 => None,
+        _ => Some(solve::smallest(s, wanted, options, cancel)?),
+    };
+    // Not before the solve, whose basis takes as much memory again.
     let mut vectors = Mat::<f64>::zeros(s.n, n);
     for (i, &label) in s.null.label.iter().enumerate() {
         if (label as usize) < zeros {
@@ -83,8 +88,7 @@ pub(super) fn eigenpairs_of(
         }
     }
     let mut residual = 0.0;
-    if wanted > 0 {
-        let pairs = solve::smallest(s, wanted, options, cancel)?;
+    if let Some(pairs) = pairs {
         let floor = ZERO * pairs.values[wanted - 1];
         for (slot, &value) in values[zeros..].iter_mut().zip(&pairs.values) {
             *slot = if value > floor { value } else { 0.0 };

@@ -34,6 +34,14 @@ impl Scratch {
         buffer.resize(length, 0.0);
         Self(buffer)
     }
+
+    /// Keeps the first `length` doubles; the memory of the others is given back to the system where it is much.
+    pub fn shrink_to(&mut self, length: usize) {
+        self.0.truncate(length);
+        if self.0.capacity() > LARGEST_KEPT {
+            self.0.shrink_to_fit();
+        }
+    }
 }
 
 impl From<Vec<f64>> for Scratch {

@@ -204,6 +204,7 @@ impl Analysis {
                 }
             }
         }
+        factor.pattern.shrink_to_fit();
         Ok(factor)
     }
 }

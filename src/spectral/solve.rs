@@ -94,16 +94,16 @@ pub fn estimated_bytes(n: usize, wanted: usize) -> usize {
     }
     let block = blocks(n)[0];
     // The first room of the basis, and as much as it grows by at a time.
-    let m = first_subspace(n, wanted, block) * 9 / 8;
+    let m = first_subspace(n, wanted, block) * 17 / 16;
     // The factor of a surface mesh has about 5 log2(n) entries per row, held twice while it is packed; S and its
     // permuted copy take another 40 numbers per row.
     let factor = 8 * n * 10 * n.ilog2() as usize;
     // Projected problem: T, its eigenvectors, workspace, coefficients.
     let projected = 8 * 5 * m * m;
-    // The basis with the factor, then with the result.
+    // The basis with the factor; then the rows that take its place, and the result in columns.
     let basis = 8 * n * (m + 8 * block);
     let operator = 8 * n * 40;
-    projected + operator + basis + factor.max(vectors)
+    projected + operator + (basis + factor).max(2 * vectors)
 }
 
 /// The `wanted` smallest eigenpairs outside the null space, checked.
