@@ -57,9 +57,9 @@ fn coding(criterion: &mut Criterion) {
             ..LearnParameters::default()
         };
         group.bench_function(format!("learn/{name}"), |bencher| {
-            bencher.iter(|| black_box(learn(training.as_ref(), &parameters, &cancel, &|_, _| {})));
+            bencher.iter(|| black_box(learn(&[training.as_ref()], &parameters, &cancel, &|_, _| {})));
         });
-        let Ok((dictionary, _)) = learn(training.as_ref(), &parameters, &cancel, &|_, _| {}) else {
+        let Ok((dictionary, _)) = learn(&[training.as_ref()], &parameters, &cancel, &|_, _| {}) else {
             continue;
         };
         group.bench_function(format!("dictionary/{name}"), |bencher| {

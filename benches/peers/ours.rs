@@ -51,7 +51,7 @@ impl State {
             "operators" => self.operators(command),
             "eigen" => self.eigen(command),
             "describe" => self.describe(command),
-            "learn" => self.learn(command),
+            "learn" => Self::learn(command),
             "dictionary" => self.dictionary(command),
             "lasso" => self.lasso(command),
             "index" => self.index(command),
@@ -114,7 +114,7 @@ impl State {
     }
 
     /// Loads signals (M × N) and learns a dictionary.
-    fn learn(&mut self, command: &Value) -> Outcome {
+    fn learn(command: &Value) -> Outcome {
         let signals = read_matrix(
             Path::new(text(command, "signals")?),
             number(command, "rows")? as usize,
@@ -127,10 +127,9 @@ impl State {
             seed: 1,
         };
         let started = Instant::now();
-        let (dictionary, report) = learn(signals.as_ref(), &learning, &Cancel::new(), &|_, _| ())?;
+        let (dictionary, report) = learn(&[signals.as_ref()], &learning, &Cancel::new(), &|_, _| ())?;
         let ms = milliseconds(started);
         write_matrix(Path::new(text(command, "dictionary")?), dictionary.atoms())?;
-        self.dictionary = Some(dictionary);
         Ok(json!({ "ms": ms, "atoms": report.atoms }))
     }
 
@@ -308,16 +307,16 @@ fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 
-fn write(path: &Path, values: &[f64]) -> std::io::Result<()> {
-    std::fs::write(
-        path,
-        values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>(),
-    )
+fn write<'a>(path: &Path, values: impl IntoIterator<Item = &'a f64>) -> std::io::Result<()> {
+    let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
+    for value in values {
+        file.write_all(&value.to_le_bytes())?;
+    }
+    file.flush()
 }
 
 fn write_matrix(path: &Path, matrix: &Mat<f64>) -> std::io::Result<()> {
-    let columns = (0..matrix.ncols()).flat_map(|j| matrix.col(j).iter().copied().collect::<Vec<f64>>());
-    write(path, &columns.collect::<Vec<f64>>())
+    write(path, (0..matrix.ncols()).flat_map(|j| matrix.col_as_slice(j)))
 }
 
 /// Reads as it goes, so that the file is not in memory twice.

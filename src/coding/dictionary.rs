@@ -64,6 +64,23 @@ impl Dictionary {
         }
     }
 
+    /// The atoms, to be changed; [`Dictionary::renew`] must follow before anything is coded.
+    pub(super) fn atoms_mut(&mut self) -> &mut Mat<f64> {
+        &mut self.atoms
+    }
+
+    /// Does with changed atoms what [`Dictionary::for_few_signals`] does, in the memory there is.
+    pub(super) fn renew(&mut self) {
+        self.squares = squares(&self.atoms);
+        self.gram.take();
+        self.screen.renew(&self.atoms);
+    }
+
+    /// D, given up.
+    pub(super) fn into_atoms(self) -> Mat<f64> {
+        self.atoms
+    }
+
     /// D, M × L, one atom per column.
     pub fn atoms(&self) -> &Mat<f64> {
         &self.atoms

@@ -7,7 +7,7 @@ use super::initialise::jittered;
 use super::lasso::column;
 use super::{Codes, Dictionary};
 use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
 
@@ -26,7 +26,6 @@ const DENSE: usize = 12;
 
 struct Step<'a> {
     update: &'a mut DictionaryUpdate,
-    dictionary: &'a Dictionary,
     batch: MatRef<'a, f64>,
     codes: &'a Codes,
 }
@@ -36,7 +35,7 @@ impl Kernel for Step<'_> {
 
     #[inline(always)]
     fn run(self) -> Vec<usize> {
-        self.update.take_in(self.dictionary, self.batch, self.codes)
+        self.update.take_in(self.batch, self.codes)
     }
 }
 
@@ -47,12 +46,12 @@ fn subtract(from: &mut [f64], weight: f64, values: &[f64]) {
     }
 }
 
-/// Atoms and running sums between mini-batches. Matrices are stored by columns, one after the other.
+/// Atoms and running sums between mini-batches. The sums are stored by columns, one after the other.
 pub(super) struct DictionaryUpdate {
     dimension: usize,
     batch: usize,
-    /// D, M × L.
-    atoms: Vec<f64>,
+    /// D, M × L; as the atoms were when it was last handed out, but for the atoms themselves.
+    dictionary: Dictionary,
     /// A = Σ aaᵀ, L × L, faded.
     code_sums: Vec<f64>,
     /// B = Σ saᵀ, M × L, faded.
@@ -61,31 +60,34 @@ pub(super) struct DictionaryUpdate {
     idle: Vec<usize>,
     iteration: usize,
     replaced: usize,
+    /// Whether atoms have moved since D was last handed out.
+    moved: bool,
     residual: Vec<f64>,
-    moved: Vec<f64>,
+    difference: Vec<f64>,
 }
 
 impl DictionaryUpdate {
-    /// From L initial atoms of M = `dimension` values.
-    pub fn new(atoms: Vec<f64>, dimension: usize, batch: usize) -> Self {
-        let count = atoms.len() / dimension;
+    /// From initial atoms.
+    pub fn new(dictionary: Dictionary, batch: usize) -> Self {
+        let (dimension, count) = (dictionary.dimension(), dictionary.len());
         Self {
             dimension,
             batch,
-            signal_sums: vec![0.0; atoms.len()],
-            atoms,
+            signal_sums: vec![0.0; dimension * count],
+            dictionary,
             code_sums: vec![0.0; count * count],
             idle: vec![0; count],
             iteration: 0,
             replaced: 0,
+            moved: false,
             residual: Vec::new(),
-            moved: Vec::new(),
+            difference: Vec::new(),
         }
     }
 
-    /// D as it stands.
-    pub fn atoms(&self) -> &[f64] {
-        &self.atoms
+    /// D, given up.
+    pub fn into_atoms(self) -> Mat<f64> {
+        self.dictionary.into_atoms()
     }
 
     /// Atoms replaced so far.
@@ -93,36 +95,33 @@ impl DictionaryUpdate {
         self.replaced
     }
 
-    /// D as it stands, with its Gram matrix.
-    pub fn dictionary(&self) -> Dictionary {
-        let atoms = MatRef::from_column_major_slice(&self.atoms, self.dimension, self.idle.len());
-        Dictionary::for_few_signals(atoms.to_owned())
+    /// D as it stands, ready to code.
+    pub fn dictionary(&mut self) -> &Dictionary {
+        if self.moved {
+            self.dictionary.renew();
+            self.moved = false;
+        }
+        &self.dictionary
     }
 
-    /// Takes in a mini-batch (M × η) coded under `dictionary`, the one last handed out, and moves the atoms.
-    pub fn step(
-        &mut self,
-        dictionary: &Dictionary,
-        batch: MatRef<'_, f64>,
-        codes: &Codes,
-        random: &mut ChaCha8Rng,
-    ) {
+    /// Takes in a mini-batch (M × η) coded under the dictionary last handed out, and moves the atoms.
+    pub fn step(&mut self, batch: MatRef<'_, f64>, codes: &Codes, random: &mut ChaCha8Rng) {
         let useless = fastest(Step {
             update: self,
-            dictionary,
             batch,
             codes,
         });
+        self.moved = true;
         self.replace(&useless, batch, codes, random);
     }
 
     /// [`Self::step`] but for the replacement of the atoms it returns.
     #[inline(always)]
-    fn take_in(&mut self, dictionary: &Dictionary, batch: MatRef<'_, f64>, codes: &Codes) -> Vec<usize> {
+    fn take_in(&mut self, batch: MatRef<'_, f64>, codes: &Codes) -> Vec<usize> {
         self.iteration += 1;
         self.fade();
         self.accumulate(batch, codes);
-        let mut useless = self.merge_duplicates(dictionary);
+        let mut useless = self.merge_duplicates();
         let count = self.idle.len();
         for j in 0..count {
             if self.idle[j] >= IDLE_SIGNALS_PER_ATOM * count {
@@ -171,13 +170,14 @@ impl DictionaryUpdate {
 
     /// Hands the sums of an atom that nearly equals an earlier one over to that one; returns the atoms left over.
     #[inline(always)]
-    fn merge_duplicates(&mut self, dictionary: &Dictionary) -> Vec<usize> {
+    fn merge_duplicates(&mut self) -> Vec<usize> {
+        let dictionary = &self.dictionary;
         let screen = dictionary.screen();
         let count = self.idle.len();
         let mut duplicates = Vec::new();
         let product = |i: usize, j: usize| {
-            let atom = |k: usize| column(dictionary.atoms().as_ref(), k);
-            dot(atom(i), atom(j))
+            let atoms = dictionary.atoms();
+            dot(atoms.col_as_slice(i), atoms.col_as_slice(j))
         };
         let norms: Vec<f64> = (0..count).map(|j| product(j, j).sqrt()).collect();
         // Where single precision sees that none is near, none is.
@@ -223,6 +223,7 @@ impl DictionaryUpdate {
     fn move_atoms(&mut self, block: Range<usize>) {
         let (m, count) = (self.dimension, self.idle.len());
         let weights = &self.code_sums[block.start * count..block.end * count];
+        let atoms = self.dictionary.atoms_mut();
         // (B − D A) of the block under the atoms as they are before the block.
         self.residual.clear();
         self.residual
@@ -230,14 +231,13 @@ impl DictionaryUpdate {
         let pairs = weights.iter().filter(|a| **a != 0.0).count();
         if DENSE * pairs > weights.len() {
             let residual = MatMut::from_column_major_slice_mut(&mut self.residual, m, block.len());
-            let atoms = MatRef::from_column_major_slice(&self.atoms, m, count);
             let weights = MatRef::from_column_major_slice(weights, count, block.len());
-            matmul(residual, Accum::Add, atoms, weights, -1.0, Par::Seq);
+            matmul(residual, Accum::Add, atoms.as_ref(), weights, -1.0, Par::Seq);
         } else {
             for (residual, weights) in self.residual.chunks_exact_mut(m).zip(weights.chunks_exact(count)) {
                 for (k, &a) in weights.iter().enumerate() {
                     if a != 0.0 {
-                        subtract(residual, a, &self.atoms[k * m..][..m]);
+                        subtract(residual, a, atoms.col_as_slice(k));
                     }
                 }
             }
@@ -248,17 +248,17 @@ impl DictionaryUpdate {
                 continue;
             }
             let residual = &self.residual[(j - block.start) * m..][..m];
-            let atom = &mut self.atoms[j * m..][..m];
-            self.moved.clear();
-            self.moved
+            let atom = atoms.col_as_slice_mut(j);
+            self.difference.clear();
+            self.difference
                 .extend(residual.iter().zip(atom.iter()).map(|(r, d)| r + weight * d));
-            let norm = dot(&self.moved, &self.moved).sqrt();
+            let norm = dot(&self.difference, &self.difference).sqrt();
             // (b_j − Σ_{k≠j} A_kj d_k)/A_jj, shortened to unit norm where it is longer.
             let scale = if norm > weight { 1.0 / norm } else { 1.0 / weight };
             if !scale.is_finite() {
                 continue;
             }
-            for (d, u) in atom.iter_mut().zip(&mut self.moved) {
+            for (d, u) in atom.iter_mut().zip(&mut self.difference) {
                 let new = scale * *u;
                 *u = new - *d;
                 *d = new;
@@ -267,7 +267,11 @@ impl DictionaryUpdate {
             for k in j + 1..block.end {
                 let a = self.code_sums[k * count + j];
                 if a != 0.0 {
-                    subtract(&mut self.residual[(k - block.start) * m..][..m], a, &self.moved);
+                    subtract(
+                        &mut self.residual[(k - block.start) * m..][..m],
+                        a,
+                        &self.difference,
+                    );
                 }
             }
         }
@@ -291,7 +295,10 @@ impl DictionaryUpdate {
                 continue;
             }
             let j = useless[taken.len()];
-            self.atoms[j * dimension..][..dimension].copy_from_slice(&atom);
+            self.dictionary
+                .atoms_mut()
+                .col_as_slice_mut(j)
+                .copy_from_slice(&atom);
             self.signal_sums[j * dimension..][..dimension].fill(0.0);
             self.code_sums[j * count..][..count].fill(0.0);
             for k in 0..count {

@@ -1,9 +1,9 @@
 //! Where learning starts: distinct signals, and atoms drawn from them.
 
+use super::columns::Columns;
 use super::dispatch::{Kernel, fastest};
 use super::dot::dot;
-use super::lasso::column;
-use faer::MatRef;
+use faer::Mat;
 use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -16,12 +16,12 @@ const JITTER: f64 = 1e-3;
 /// Numbers of the signals (columns, M × N) that are farther than 1e-9 of the largest norm from every one kept before
 /// them, ascending. Signals are compared only where their projections on one direction are that near, so this costs
 /// one pass over the data and a sort. `None` where a signal is not finite.
-pub(super) fn distinct(signals: MatRef<'_, f64>) -> Option<Vec<usize>> {
+pub(super) fn distinct(signals: &Columns<'_>) -> Option<Vec<usize>> {
     fastest(Distinct { signals })
 }
 
 struct Distinct<'a> {
-    signals: MatRef<'a, f64>,
+    signals: &'a Columns<'a>,
 }
 
 impl Kernel for Distinct<'_> {
@@ -34,12 +34,11 @@ impl Kernel for Distinct<'_> {
 }
 
 #[inline(always)]
-fn find_distinct(signals: MatRef<'_, f64>) -> Option<Vec<usize>> {
-    let direction = direction(signals.nrows());
-    let mut projections = Vec::with_capacity(signals.ncols());
+fn find_distinct(signals: &Columns<'_>) -> Option<Vec<usize>> {
+    let direction = direction(signals.dimension());
+    let mut projections = Vec::with_capacity(signals.len());
     let mut largest: f64 = 0.0;
-    for i in 0..signals.ncols() {
-        let signal = column(signals, i);
+    for (i, signal) in signals.iter().enumerate() {
         let norm2 = dot(signal, signal);
         if !norm2.is_finite() {
             return None;
@@ -51,12 +50,12 @@ fn find_distinct(signals: MatRef<'_, f64>) -> Option<Vec<usize>> {
     projections.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut kept: Vec<(f64, usize)> = Vec::with_capacity(projections.len());
     for &(projection, i) in &projections {
-        let signal = column(signals, i);
+        let signal = signals.column(i);
         let window = kept
             .iter()
             .rev()
             .take_while(|(other, _)| projection - other <= near);
-        let mut copies = window.map(|&(_, j)| distance2(signal, column(signals, j)));
+        let mut copies = window.map(|&(_, j)| distance2(signal, signals.column(j)));
         if copies.all(|distance2| distance2 > near * near) {
             kept.push((projection, i));
         }
@@ -81,21 +80,22 @@ fn distance2(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
-/// L initial atoms (M values each, one after the other): distinct training signals in random order, jittered, unit
-/// norm. `distinct` must hold at least `atoms` numbers.
+/// L initial atoms, M × L: distinct training signals in random order, jittered, unit norm. `distinct` must hold at
+/// least L numbers.
 pub(super) fn initial_atoms(
-    signals: MatRef<'_, f64>,
+    signals: &Columns<'_>,
     distinct: &[usize],
-    atoms: usize,
+    count: usize,
     random: &mut ChaCha8Rng,
-) -> Vec<f64> {
+) -> Mat<f64> {
     let mut drawn = distinct.to_vec();
-    let (drawn, _) = drawn.partial_shuffle(random, atoms);
-    let mut all = Vec::with_capacity(atoms * signals.nrows());
-    for &i in drawn.iter() {
-        all.extend_from_slice(&jittered(column(signals, i), random));
+    let (drawn, _) = drawn.partial_shuffle(random, count);
+    let mut atoms = Mat::zeros(signals.dimension(), count);
+    for (k, &i) in drawn.iter().enumerate() {
+        let atom = jittered(signals.column(i), random);
+        atoms.col_as_slice_mut(k).copy_from_slice(&atom);
     }
-    all
+    atoms
 }
 
 /// The signal with jitter, at unit norm; a random direction where the signal is zero.

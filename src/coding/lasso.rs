@@ -110,12 +110,3 @@ pub(super) fn column<T>(matrix: MatRef<'_, T>, j: usize) -> &[T] {
         .try_as_col_major()
         .map_or(&[], |column| column.as_slice())
 }
-
-/// Runs `work` on the same values with adjacent columns; copies them only where they are not.
-pub(super) fn with_column_major<T>(signals: MatRef<'_, f64>, work: impl FnOnce(MatRef<'_, f64>) -> T) -> T {
-    if signals.row_stride() == 1 {
-        work(signals)
-    } else {
-        work(signals.to_owned().as_ref())
-    }
-}

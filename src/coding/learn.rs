@@ -1,8 +1,9 @@
 //! Online dictionary learning (method, step 7; Mairal, Bach, Ponce, Sapiro 2010, Algorithms 1 and 2).
 
+use super::columns::Columns;
 use super::dictionary_update::DictionaryUpdate;
 use super::initialise::{distinct, initial_atoms};
-use super::lasso::{check_lambda, column, with_column_major};
+use super::lasso::check_lambda;
 use super::{CodingError, Dictionary, Signals, encode, score_signals};
 use crate::cancel::Cancel;
 use faer::{Mat, MatRef};
@@ -64,8 +65,8 @@ pub struct LearnReport {
 /// are no more.
 const MEASURED: usize = 500;
 
-/// Learns a dictionary from the columns of `signals` (M × N). `progress(done, total)` is called after every
-/// mini-batch.
+/// Learns a dictionary from the columns of all matrices of `signals` (M × N in all, as if they stood side by side; they
+/// are copied only where columns are not contiguous). `progress(done, total)` is called after every mini-batch.
 ///
 /// Initial atoms are distinct training signals, jittered. Mini-batches run through all signals in random order, again
 /// and again; each is coded under the current atoms, enters the running sums A = Σ aaᵀ and B = Σ saᵀ, and the atoms
@@ -77,21 +78,28 @@ const MEASURED: usize = 500;
 /// The result depends on the signals, the parameters and nothing else.
 ///
 /// # Errors
-/// [`CodingError::NoSignatures`] for N = 0 or M = 0, [`CodingError::BadParameter`] for no atoms, an empty batch or λ
+/// [`CodingError::NoSignatures`] for N = 0 or M = 0, [`CodingError::DimensionMismatch`] for matrices of unequal M,
+/// [`CodingError::BadParameter`] for no atoms, an empty batch or λ
 /// not positive and finite, [`CodingError::NotFinite`], [`CodingError::Cancelled`], and what coding can fail with.
 pub fn learn(
-    signals: MatRef<'_, f64>,
+    signals: &[MatRef<'_, f64>],
     parameters: &LearnParameters,
     cancel: &Cancel,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<(Dictionary, LearnReport), CodingError> {
-    check(signals, parameters)?;
-    with_column_major(signals, |signals| {
-        learn_columns(signals, parameters, cancel, progress)
-    })
+    check(parameters)?;
+    let copies: Vec<Option<Mat<f64>>> = signals
+        .iter()
+        .map(|part| (part.row_stride() != 1).then(|| part.to_owned()))
+        .collect();
+    let parts = signals
+        .iter()
+        .zip(&copies)
+        .map(|(part, copy)| copy.as_ref().map_or(*part, Mat::as_ref));
+    learn_columns(&Columns::new(parts.collect())?, parameters, cancel, progress)
 }
 
-fn check(signals: MatRef<'_, f64>, parameters: &LearnParameters) -> Result<(), CodingError> {
+fn check(parameters: &LearnParameters) -> Result<(), CodingError> {
     check_lambda(parameters.lambda)?;
     for (name, value) in [("atoms", parameters.atoms), ("batch", parameters.batch)] {
         if value == 0 {
@@ -102,14 +110,11 @@ fn check(signals: MatRef<'_, f64>, parameters: &LearnParameters) -> Result<(), C
             });
         }
     }
-    if signals.nrows() == 0 || signals.ncols() == 0 {
-        return Err(CodingError::NoSignatures);
-    }
     Ok(())
 }
 
 fn learn_columns(
-    signals: MatRef<'_, f64>,
+    signals: &Columns<'_>,
     parameters: &LearnParameters,
     cancel: &Cancel,
     progress: &(dyn Fn(usize, usize) + Sync),
@@ -118,22 +123,30 @@ fn learn_columns(
         return Err(CodingError::NotFinite { what: "signature" });
     };
     let mut random = ChaCha8Rng::seed_from_u64(parameters.seed);
-    let atoms = parameters.atoms.min(distinct.len());
-    let initial = initial_atoms(signals, &distinct, atoms, &mut random);
-    let mut order: Vec<usize> = (0..signals.ncols()).collect();
+    let count = parameters.atoms.min(distinct.len());
+    // Drawn again where they are needed again, rather than kept.
+    let mut drawing = random.clone();
+    let initial = initial_atoms(signals, &distinct, count, &mut random);
+    let mut order: Vec<usize> = (0..signals.len()).collect();
     order.shuffle(&mut random);
-    let measured = gather(signals, &order[..MEASURED.min(order.len())]);
-    let measured = Signals::new(measured.as_ref())?;
+    let measured = order[..MEASURED.min(order.len())].to_vec();
     order.shuffle(&mut random);
-
-    let mean_objective = |dictionary: &Dictionary| -> Result<f64, CodingError> {
+    let mut memory = Mat::with_capacity(
+        signals.dimension(),
+        MEASURED.max(parameters.batch).min(order.len()),
+    );
+    let mean_objective = |dictionary: &Dictionary, memory: &mut Mat<f64>| -> Result<f64, CodingError> {
+        signals.gather(&measured, memory);
+        let measured = Signals::new(memory.as_ref())?;
         let scores = score_signals(dictionary, &measured, parameters.lambda, cancel)?;
         Ok(scores.iter().map(|score| score.objective).sum::<f64>() / scores.len() as f64)
     };
-    let first = Dictionary::for_few_signals(rounded(&initial, signals.nrows()));
-    let initial_objective = mean_objective(&first)?;
+    let mut dictionary = Dictionary::for_few_signals(rounded(initial.clone()));
+    let initial_objective = mean_objective(&dictionary, &mut memory)?;
+    *dictionary.atoms_mut() = initial;
+    dictionary.renew();
 
-    let mut update = DictionaryUpdate::new(initial, signals.nrows(), parameters.batch);
+    let mut update = DictionaryUpdate::new(dictionary, parameters.batch);
     let batch = parameters.batch.min(order.len());
     let mut next = 0;
     for iteration in 0..parameters.iterations {
@@ -147,42 +160,37 @@ fn learn_columns(
             drawn.push(order[next]);
             next += 1;
         }
-        let batch = gather(signals, &drawn);
-        let dictionary = update.dictionary();
-        let codes = encode(&dictionary, batch.as_ref(), parameters.lambda, cancel)?;
-        update.step(&dictionary, batch.as_ref(), &codes, &mut random);
+        signals.gather(&drawn, &mut memory);
+        let codes = encode(update.dictionary(), memory.as_ref(), parameters.lambda, cancel)?;
+        update.step(memory.as_ref(), &codes, &mut random);
         progress(iteration + 1, parameters.iterations);
     }
 
-    let mut dictionary = Dictionary::new(rounded(update.atoms(), signals.nrows()))?;
-    let mut objective = mean_objective(&dictionary)?;
+    let replaced = update.replaced();
+    let mut dictionary = Dictionary::new(rounded(update.into_atoms()))?;
+    let mut objective = mean_objective(&dictionary, &mut memory)?;
     if objective > initial_objective {
-        (dictionary, objective) = (Dictionary::new(first.atoms().clone())?, initial_objective);
+        let initial = initial_atoms(signals, &distinct, count, &mut drawing);
+        (dictionary, objective) = (Dictionary::new(rounded(initial))?, initial_objective);
     }
     let report = LearnReport {
-        signals: signals.ncols(),
+        signals: signals.len(),
         distinct_signals: distinct.len(),
         atoms_requested: parameters.atoms,
-        atoms,
-        replaced: update.replaced(),
+        atoms: count,
+        replaced,
         initial_objective,
         objective,
     };
     Ok((dictionary, report))
 }
 
-/// The named columns side by side.
-fn gather(signals: MatRef<'_, f64>, numbers: &[usize]) -> Mat<f64> {
-    let mut all = Mat::zeros(signals.nrows(), numbers.len());
-    for (k, &i) in numbers.iter().enumerate() {
-        all.col_as_slice_mut(k).copy_from_slice(column(signals, i));
+/// The atoms at `f32` precision.
+fn rounded(mut atoms: Mat<f64>) -> Mat<f64> {
+    for j in 0..atoms.ncols() {
+        for value in atoms.col_as_slice_mut(j) {
+            *value = f64::from(*value as f32);
+        }
     }
-    all
-}
-
-/// The atoms at `f32` precision, M × L.
-fn rounded(atoms: &[f64], dimension: usize) -> Mat<f64> {
-    Mat::from_fn(dimension, atoms.len() / dimension, |i, j| {
-        f64::from(atoms[j * dimension + i] as f32)
-    })
+    atoms
 }

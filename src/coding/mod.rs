@@ -2,6 +2,7 @@
 
 mod active_set;
 mod cholesky;
+mod columns;
 pub mod dictionary;
 mod dictionary_update;
 mod dispatch;

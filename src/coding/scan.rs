@@ -51,8 +51,15 @@ impl Rows {
             values: vec![[0.0; LANES]; width * count],
             width,
         };
-        let stride = width * LANES;
-        let values = rows.values.as_flattened_mut();
+        rows.renew_gram(atoms);
+        rows
+    }
+
+    /// [`Rows::gram`] of as many atoms as before, in its place.
+    pub fn renew_gram(&mut self, atoms: MatRef<'_, f32>) {
+        let count = atoms.ncols();
+        let stride = self.width * LANES;
+        let values = self.values.as_flattened_mut();
         matmul(
             MatMut::from_column_major_slice_with_stride_mut(values, count, count, stride),
             BlockStructure::TriangularLower,
@@ -74,7 +81,6 @@ impl Rows {
                 }
             }
         }
-        rows
     }
 
     #[inline(always)]

@@ -49,12 +49,16 @@ pub(super) struct ScreenMemory {
 /// At single precision, with at least `columns` columns; those added are zero.
 fn single(matrix: &Mat<f64>, columns: usize) -> Mat<f32> {
     let mut rounded = Mat::zeros(matrix.nrows(), columns);
+    round(matrix, &mut rounded);
+    rounded
+}
+
+fn round(matrix: &Mat<f64>, rounded: &mut Mat<f32>) {
     for j in 0..matrix.ncols() {
         for (to, from) in rounded.col_as_slice_mut(j).iter_mut().zip(matrix.col_as_slice(j)) {
             *to = *from as f32;
         }
     }
-    rounded
 }
 
 fn rounded_gram(gram: &Mat<f64>) -> Rows {
@@ -78,6 +82,12 @@ impl Screen {
             atoms: rounded,
             tail: 0.0,
         }
+    }
+
+    /// [`Screen::direct`] of as many atoms as before, in its place.
+    pub fn renew(&mut self, atoms: &Mat<f64>) {
+        round(atoms, &mut self.atoms);
+        self.gram.renew_gram(self.atoms.subcols(0, atoms.ncols()));
     }
 
     /// With projection where it pays: for a dictionary that codes many signals.

@@ -4,8 +4,7 @@ use super::{Description, PipelineError};
 use crate::cancel::Cancel;
 use crate::coding::{CodingError, Dictionary, LearnReport, learn};
 use crate::parameters::{Channel, Parameters};
-use crate::ranking::View;
-use faer::Mat;
+use faer::MatRef;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -46,40 +45,21 @@ pub fn learn_model(
     let mut dictionaries = BTreeMap::new();
     let mut report = ModelReport::default();
     for (done, &channel) in channels.iter().enumerate() {
-        let signals = concatenate(shapes, channel)?;
+        let signals = signals(shapes, channel)?;
         let step = |batch: usize, batches: usize| progress(done * batches + batch, channels.len() * batches);
-        let (dictionary, learnt) = learn(signals.as_ref(), &learning, cancel, &step)?;
+        let (dictionary, learnt) = learn(&signals, &learning, cancel, &step)?;
         dictionaries.insert(channel, Arc::new(dictionary));
         report.channels.insert(channel, learnt);
     }
     Ok(Model { dictionaries, report })
 }
 
-/// The signatures of all shapes in one channel, side by side: M × ΣN.
-fn concatenate(shapes: &[&Description], channel: Channel) -> Result<Mat<f64>, CodingError> {
-    let parts = shapes
+/// The signatures of all shapes in one channel, M × N each.
+fn signals<'a>(shapes: &[&'a Description], channel: Channel) -> Result<Vec<MatRef<'a, f64>>, CodingError> {
+    let view = |shape: &&'a Description| shape.views.iter().find(|view| view.channel == channel);
+    shapes
         .iter()
-        .map(|shape| shape.views.iter().find(|view| view.channel == channel))
-        .collect::<Option<Vec<&View>>>()
-        .ok_or(CodingError::NoSignatures)?;
-    let dimension = parts
-        .first()
-        .ok_or(CodingError::NoSignatures)?
-        .signatures
-        .dimension();
-    let total = parts.iter().map(|v| v.signatures.len()).sum();
-    let mut all = Mat::zeros(dimension, total);
-    let mut next = 0;
-    for part in parts {
-        let matrix = &part.signatures.matrix;
-        if matrix.nrows() != dimension {
-            return Err(CodingError::DimensionMismatch {
-                signature: matrix.nrows(),
-                atoms: dimension,
-            });
-        }
-        all.as_mut().subcols_mut(next, matrix.ncols()).copy_from(matrix);
-        next += matrix.ncols();
-    }
-    Ok(all)
+        .map(|shape| Some(view(shape)?.signatures.matrix.as_ref()))
+        .collect::<Option<_>>()
+        .ok_or(CodingError::NoSignatures)
 }

@@ -7,7 +7,7 @@ use shapelex::coding::{CodingError, Dictionary, LearnParameters, LearnReport, le
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn learnt(signals: &Mat<f64>, parameters: &LearnParameters) -> (Dictionary, LearnReport) {
-    learn(signals.as_ref(), parameters, &Cancel::new(), &|_, _| {}).unwrap()
+    learn(&[signals.as_ref()], parameters, &Cancel::new(), &|_, _| {}).unwrap()
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn progress_is_told_and_cancellation_obeyed() {
     let told = |done, total| {
         assert_eq!((done, total), (seen.fetch_add(1, Ordering::Relaxed) + 1, 6));
     };
-    learn(signals.as_ref(), &parameters, &Cancel::new(), &told).unwrap();
+    learn(&[signals.as_ref()], &parameters, &Cancel::new(), &told).unwrap();
     assert_eq!(seen.load(Ordering::Relaxed), 6);
     let cancel = Cancel::new();
     let stop = |done, _| {
@@ -137,7 +137,7 @@ fn progress_is_told_and_cancellation_obeyed() {
             cancel.cancel();
         }
     };
-    let result = learn(signals.as_ref(), &parameters, &cancel, &stop);
+    let result = learn(&[signals.as_ref()], &parameters, &cancel, &stop);
     assert_eq!(result.err(), Some(CodingError::Cancelled(Cancelled)));
 }
 
@@ -145,7 +145,7 @@ fn progress_is_told_and_cancellation_obeyed() {
 fn bad_input_is_refused() {
     let signals = bumps(10, 20, 6);
     let attempt = |signals: &Mat<f64>, parameters: LearnParameters| {
-        learn(signals.as_ref(), &parameters, &Cancel::new(), &|_, _| {}).err()
+        learn(&[signals.as_ref()], &parameters, &Cancel::new(), &|_, _| {}).err()
     };
     let plain = LearnParameters::default();
     assert_eq!(
