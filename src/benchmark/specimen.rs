@@ -92,7 +92,7 @@ impl Specimen {
             places[i] = solve(soup, &coding[i], &mut solved, &mut spectra, cancel)?;
         }
         for (parameters, at) in coding.iter().zip(places) {
-            let shape = &solved[at].shape;
+            let shape = &mut solved[at].shape;
             seen.push(if parameters.hypotheses == [Hypothesis::Plain] {
                 Seen::Plain {
                     spectrum: at,

@@ -35,7 +35,7 @@ pub fn describe_shape(
 }
 
 /// Describes a query: one view per hypothesis (an open surface's doubling gives one per assumed area),
-/// `query_samples` signatures each.
+/// `query_samples` signatures each. A hypothesis other than the plain one that fails is left out, with a warning.
 ///
 /// # Errors
 /// The error of the stage that failed, or [`PipelineError::Cancelled`].
@@ -45,7 +45,7 @@ pub fn describe_query(
     cancel: &Cancel,
     observer: &dyn Fn(Stage),
 ) -> Result<Description, PipelineError> {
-    let shape = PreparedShape::new(soup, parameters, cancel, observer)?;
+    let mut shape = PreparedShape::new(soup, parameters, cancel, observer)?;
     let views = shape.query_views(parameters, cancel)?;
     Ok(shape.into_description(views))
 }
@@ -60,7 +60,7 @@ pub fn describe_both(
     parameters: &Parameters,
     cancel: &Cancel,
 ) -> Result<(Description, Description), PipelineError> {
-    let shape = PreparedShape::new(soup, parameters, cancel, &|_| ())?;
+    let mut shape = PreparedShape::new(soup, parameters, cancel, &|_| ())?;
     let training = shape.training_views(parameters)?;
     let query = shape.query_views(parameters, cancel)?;
     let query = Description {

@@ -52,8 +52,8 @@ pub struct PreparedShape {
     mesh: TriMesh,
     operators: Operators,
     eigenpairs: Eigenpairs,
-    /// Of the whitened mesh, where the parameters ask for that hypothesis.
-    whitened: Option<Eigenpairs>,
+    /// Of the whitened mesh, where the parameters ask for that hypothesis. Without it a query can still be compared.
+    whitened: Option<Result<Eigenpairs, PipelineError>>,
     report: PrepareReport,
 }
 
@@ -84,7 +84,7 @@ impl PreparedShape {
                 || solve(&operators),
                 || -> Result<Eigenpairs, PipelineError> { Ok(solve(&assemble(&whiten(&mesh)?)?)?) },
             );
-            (plain?, Some(whitened?))
+            (plain?, Some(whitened))
         } else {
             (solve(&operators)?, None)
         };
@@ -127,18 +127,40 @@ impl PreparedShape {
         Ok(views)
     }
 
-    /// The views of a query: one per hypothesis and assumed area.
-    pub fn query_views(&self, parameters: &Parameters, cancel: &Cancel) -> Result<Vec<View>, PipelineError> {
+    /// The views of a query: one per hypothesis and assumed area. A hypothesis other than the plain one that fails is
+    /// left out, with a warning in the report.
+    ///
+    /// # Errors
+    /// That of the plain view, or [`PipelineError::Cancelled`].
+    pub fn query_views(
+        &mut self,
+        parameters: &Parameters,
+        cancel: &Cancel,
+    ) -> Result<Vec<View>, PipelineError> {
         let vertices = self.sample(parameters.query_samples, parameters.seed);
         let mut views = Vec::new();
         for hypothesis in &parameters.hypotheses {
-            match hypothesis {
-                Hypothesis::Plain => views.push(self.plain(&vertices, parameters)?),
-                Hypothesis::Whitened => views.extend(self.whitened(&vertices, parameters)?),
-                Hypothesis::Doubled if self.report.openness > OPEN_ABOVE => {
-                    views.extend(self.doubled(&vertices, parameters, cancel)?);
+            let (seen, what) = match hypothesis {
+                Hypothesis::Plain => {
+                    views.push(self.plain(&vertices, parameters)?);
+                    continue;
                 }
-                Hypothesis::Doubled => {}
+                Hypothesis::Whitened => {
+                    let whitened = self.whitened(&vertices, parameters);
+                    (whitened.map(Vec::from_iter), "affinely normalised")
+                }
+                Hypothesis::Doubled if self.report.openness > OPEN_ABOVE => {
+                    (self.doubled(&vertices, parameters, cancel), "as a part")
+                }
+                Hypothesis::Doubled => continue,
+            };
+            match seen {
+                Ok(seen) => views.extend(seen),
+                Err(PipelineError::Cancelled(cancelled)) => return Err(cancelled.into()),
+                Err(error) => {
+                    let warning = format!("The shape was not compared {what}: {error}.");
+                    self.report.warnings.push(warning);
+                }
             }
         }
         Ok(views)
@@ -180,7 +202,7 @@ impl PreparedShape {
             .as_ref()
             .map(|eigenpairs| {
                 view(
-                    eigenpairs,
+                    eigenpairs.as_ref().map_err(PipelineError::clone)?,
                     vertices,
                     parameters,
                     Hypothesis::Whitened,
@@ -268,4 +290,54 @@ fn view(
         area_scale,
         signatures,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cancel::Cancelled;
+    use crate::parameters::Preset;
+    use crate::spectral::SpectralError;
+    use std::f64::consts::TAU;
+
+    /// A torus of 30 × 60 vertices, uneven enough to have no multiple eigenvalues.
+    fn torus() -> TriangleSoup {
+        let mut soup = TriangleSoup::default();
+        for i in 0..60u32 {
+            for j in 0..30u32 {
+                let (u, v) = (TAU * f64::from(i) / 60.0, TAU * f64::from(j) / 30.0);
+                let r = 1.0 + (0.4 + 0.05 * (3.0 * u).sin()) * v.cos();
+                soup.vertices
+                    .push([1.3 * r * u.cos(), r * u.sin(), 0.4 * v.sin()]);
+                let at = |i: u32, j: u32| i % 60 * 30 + j % 30;
+                soup.faces.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                soup.faces.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+        soup
+    }
+
+    #[test]
+    fn a_query_is_compared_without_a_hypothesis_that_fails() {
+        let parameters = Parameters::preset(Preset::Robust);
+        let mut shape = PreparedShape::new(torus(), &parameters, &Cancel::new(), &|_| ()).unwrap();
+        let hypotheses = |views: &[View]| views.iter().map(|view| view.hypothesis).collect::<Vec<_>>();
+        let views = shape.query_views(&parameters, &Cancel::new()).unwrap();
+        assert_eq!(hypotheses(&views), [Hypothesis::Plain, Hypothesis::Whitened]);
+        assert!(shape.report.warnings.is_empty(), "{:?}", shape.report.warnings);
+
+        let failed = SpectralError::NotConverged {
+            detail: "a test".to_owned(),
+        };
+        shape.whitened = Some(Err(failed.clone().into()));
+        let views = shape.query_views(&parameters, &Cancel::new()).unwrap();
+        assert_eq!(hypotheses(&views), [Hypothesis::Plain]);
+        assert!(shape.report.warnings[0].contains("affinely normalised") && shape.report.warnings.len() == 1);
+        // A training shape needs every channel.
+        assert_eq!(shape.training_views(&parameters).unwrap_err(), failed.into());
+
+        shape.whitened = Some(Err(Cancelled.into()));
+        let stopped = shape.query_views(&parameters, &Cancel::new());
+        assert_eq!(stopped.unwrap_err(), Cancelled.into());
+    }
 }
