@@ -142,6 +142,35 @@ fn progress_is_told_and_cancellation_obeyed() {
 }
 
 #[test]
+fn how_the_signals_are_divided_does_not_matter() {
+    let signals = bumps(30, 400, 2);
+    let parameters = LearnParameters {
+        atoms: 20,
+        iterations: 8,
+        batch: 64,
+        ..LearnParameters::default()
+    };
+    let (whole, report) = learnt(&signals, &parameters);
+    // One of the parts is empty, and one row by row in memory.
+    let rows = signals.subcols(150, 200).transpose().to_owned();
+    let parts = [
+        signals.subcols(0, 150),
+        rows.transpose(),
+        signals.subcols(350, 0),
+        signals.subcols(350, 50),
+    ];
+    let (divided, divided_report) = learn(&parts, &parameters, &Cancel::new(), &|_, _| {}).unwrap();
+    assert_eq!(whole.atoms(), divided.atoms());
+    assert_eq!(report, divided_report);
+    let other = bumps(31, 5, 2);
+    let unequal = [signals.as_ref(), other.as_ref()];
+    assert!(matches!(
+        learn(&unequal, &parameters, &Cancel::new(), &|_, _| {}),
+        Err(CodingError::DimensionMismatch { .. })
+    ));
+}
+
+#[test]
 fn bad_input_is_refused() {
     let signals = bumps(10, 20, 6);
     let attempt = |signals: &Mat<f64>, parameters: LearnParameters| {
