@@ -50,7 +50,7 @@ fn subtract(from: &mut [f64], weight: f64, values: &[f64]) {
 pub(super) struct DictionaryUpdate {
     dimension: usize,
     batch: usize,
-    /// D, M × L; as the atoms were when it was last handed out, but for the atoms themselves.
+    /// D, M × L. What it holds beside the atoms is that of the atoms last handed out.
     dictionary: Dictionary,
     /// A = Σ aaᵀ, L × L, faded.
     code_sums: Vec<f64>,

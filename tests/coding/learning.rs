@@ -10,6 +10,17 @@ fn learnt(signals: &Mat<f64>, parameters: &LearnParameters) -> (Dictionary, Lear
     learn(&[signals.as_ref()], parameters, &Cancel::new(), &|_, _| {}).unwrap()
 }
 
+/// Few signals and few mini-batches.
+fn small() -> (Mat<f64>, LearnParameters) {
+    let parameters = LearnParameters {
+        atoms: 20,
+        iterations: 8,
+        batch: 64,
+        ..LearnParameters::default()
+    };
+    (bumps(30, 400, 2), parameters)
+}
+
 #[test]
 fn the_objective_falls_and_the_atoms_keep_their_contract() {
     let signals = bumps(60, 1500, 1);
@@ -56,13 +67,7 @@ fn a_planted_dictionary_is_nearly_recovered() {
 
 #[test]
 fn the_same_seed_gives_the_same_dictionary_and_another_seed_another() {
-    let signals = bumps(30, 400, 2);
-    let parameters = LearnParameters {
-        atoms: 20,
-        iterations: 8,
-        batch: 64,
-        ..LearnParameters::default()
-    };
+    let (signals, parameters) = small();
     let (first, _) = learnt(&signals, &parameters);
     let (second, _) = learnt(&signals, &parameters);
     let (other, _) = learnt(
@@ -143,13 +148,7 @@ fn progress_is_told_and_cancellation_obeyed() {
 
 #[test]
 fn how_the_signals_are_divided_does_not_matter() {
-    let signals = bumps(30, 400, 2);
-    let parameters = LearnParameters {
-        atoms: 20,
-        iterations: 8,
-        batch: 64,
-        ..LearnParameters::default()
-    };
+    let (signals, parameters) = small();
     let (whole, report) = learnt(&signals, &parameters);
     // One of the parts is empty, and one row by row in memory.
     let rows = signals.subcols(150, 200).transpose().to_owned();
