@@ -33,6 +33,10 @@ const OUT_OF_CACHE: usize = 20_000;
 /// The coarsest grid that keeps a face has eight cells, and one vertex for each.
 const SMALLEST: usize = 8;
 
+/// Cells along the longest side of the grids that clustering tries; one cell keeps no face, the library's limit is 1025.
+const COARSEST_GRID: usize = 2;
+const FINEST_GRID: usize = 1000;
+
 /// No bound on the error: the target is a size.
 pub(super) const ANY_ERROR: f32 = 1e3;
 
@@ -88,6 +92,9 @@ pub(super) fn simplify_to(
         ),
     ];
     for (options, outcome) in steps {
+        if !collapse_in_pieces(mesh, 2 * size, options, cancel)? {
+            continue;
+        }
         collapse(mesh, size, options, cancel)?;
         tidy(mesh)?;
         if mesh.vertices.len() <= size {
@@ -111,7 +118,6 @@ fn collapse(
     options: SimplifyOptions,
     cancel: &Cancel,
 ) -> Result<(), Cancelled> {
-    collapse_in_pieces(mesh, 2 * size, options, cancel)?;
     let mut faces_per_vertex = 2.0;
     for round in 0..ROUNDS {
         let (v, f) = (mesh.vertices.len(), mesh.faces.len());
@@ -145,23 +151,32 @@ fn collapse(
     Ok(())
 }
 
-/// Vertex clustering on the finest grid that leaves at most `size` vertices. The library is asked for faces, of which
-/// a vertex may have any number here, so their number is searched for.
+/// Vertex clustering on the finest grid that leaves at most `size` vertices.
+///
+/// The library is asked for faces, of which a vertex may have any number here; so it is given the grid, as the error,
+/// and the grid is searched for. A surface fills some four times the square of the cells along a side.
 fn cluster(mesh: &mut Cleaned, size: usize, cancel: &Cancel) -> Result<(), Cancelled> {
     let indices: Vec<u32> = mesh.faces.iter().flatten().copied().collect();
     let positions = single_precision(&mesh.vertices);
     let mut best = Vec::new();
-    let (mut low, mut high) = (1, mesh.faces.len());
-    while low <= high {
+    let mut cells = ((size as f64 / 4.0).sqrt() as usize).clamp(COARSEST_GRID, FINEST_GRID);
+    let (mut fits, mut exceeds) = (COARSEST_GRID - 1, FINEST_GRID + 1);
+    while exceeds - fits > 1 {
         cancel.check()?;
-        let target = low.midpoint(high);
-        let result = simplify_sloppy_decoder(&indices, &positions, 3 * target, ANY_ERROR, None);
+        // The inverse, rounded down, is the number of cells. No faces are asked for, which every grid meets.
+        let error = 1.0 / (cells as f32 + 0.5);
+        let result = simplify_sloppy_decoder(&indices, &positions, 0, error, None);
         if distinct(&result, positions.len()) <= size {
             best = result;
-            low = target + 1;
+            fits = cells;
         } else {
-            high = target - 1;
+            exceeds = cells;
         }
+        cells = if exceeds > FINEST_GRID {
+            (2 * cells).min(FINEST_GRID)
+        } else {
+            fits.midpoint(exceeds)
+        };
     }
     adopt(mesh, &best);
     Ok(())

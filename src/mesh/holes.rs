@@ -11,7 +11,8 @@ const NO_AREA: f64 = 1e-12;
 ///
 /// The new vertices are appended, so the indices of the old ones stay. The area is that before anything is closed.
 /// Fan faces run against their neighbours' direction, as on a consistently oriented surface. A loop whose whole fan
-/// has no area (a slit) stays.
+/// has no area (a slit) stays, and so do all where there are more loops than vertices: in a tangle of faces they bound
+/// no holes, and their centres would be most of the mesh.
 pub(super) fn fill_small_holes(
     vertices: &mut Vec<[f64; 3]>,
     faces: &mut Vec<[u32; 3]>,
@@ -23,7 +24,11 @@ pub(super) fn fill_small_holes(
     }
     let area: f64 = faces.iter().map(|f| face_area(vertices, f)).sum();
     let mut filled = 0;
-    for edges in boundary_loops(vertices, boundary) {
+    let loops = boundary_loops(vertices, boundary);
+    if loops.len() > vertices.len() {
+        return 0;
+    }
+    for edges in loops {
         if boundary_length(vertices, &edges) >= below * area.sqrt() {
             continue;
         }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 /// Faces of a piece: its edges' quadrics fit the second-level cache, and it is done within some milliseconds.
 const PIECE: usize = 16_384;
 /// Meshes of fewer pieces than this are collapsed as a whole.
-const FEWEST: usize = 8;
+const FEWEST: usize = 4;
 /// Share of a piece's faces that a round leaves.
 const KEPT: f64 = 0.25;
 /// A round leaves at least this many times the faces that are wanted in the end, so that the collapses that shape the
@@ -23,17 +23,20 @@ const WORTHWHILE: f64 = 0.6;
 /// A round cuts the faces into runs of neighbours and collapses edges within each; what lies on a run's border stays. The
 /// next round's runs are longer, so their borders are elsewhere. Pieces are independent: they are worked on in parallel,
 /// the result does not depend on the number of threads, and a cancelled one waits for no more than a piece.
+///
+/// False where a round hardly helps and many faces are left: almost all edges are borders of pieces or places where
+/// collapses are not possible. On such a mesh, a random complex say, collapses over the whole would take minutes.
 pub(super) fn collapse_in_pieces(
     mesh: &mut Cleaned,
     faces: usize,
     options: SimplifyOptions,
     cancel: &Cancel,
-) -> Result<(), Cancelled> {
+) -> Result<bool, Cancelled> {
     while mesh.faces.len() >= FEWEST * PIECE {
         let before = mesh.faces.len();
         let kept = (RESERVE * faces as f64 / before as f64).max(KEPT);
         if kept > WORTHWHILE {
-            return Ok(());
+            return Ok(true);
         }
         let pieces = mesh
             .faces
@@ -46,11 +49,10 @@ pub(super) fn collapse_in_pieces(
         mesh.faces = pieces.concat();
         drop_unreferenced(&mut mesh.vertices, &mut mesh.faces);
         if mesh.faces.len() as f64 > WORTHWHILE * before as f64 {
-            // Mostly borders: many small parts, or places where collapses are not possible.
-            return Ok(());
+            return Ok(mesh.faces.len() < FEWEST * PIECE);
         }
     }
-    Ok(())
+    Ok(true)
 }
 
 /// Collapses edges inside a run of faces until a share `kept` of them is left or no collapse is possible.

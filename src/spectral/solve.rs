@@ -31,8 +31,8 @@ pub struct Pairs {
 const BELOW_SHIFT: f64 = 0.58;
 const BELOW_SHIFT_RANGE: std::ops::RangeInclusive<f64> = 0.5..=0.66;
 
-/// Largest mesh the dense solver is the last resort for (288 MB per matrix, a minute).
-const DENSE_LAST_RESORT: usize = 6000;
+/// Largest mesh the dense solver, which cannot be interrupted, is the last resort for (72 MB per matrix, seven seconds).
+const DENSE_LAST_RESORT: usize = 3000;
 
 /// Eigenvalues below this share of the largest are zero as far as double precision can tell.
 pub const ZERO: f64 = 1e-9;

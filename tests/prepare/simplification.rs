@@ -232,3 +232,32 @@ fn hostile_topology_meets_the_size_or_says_so() {
     assert!(report.vertices <= 2000);
     assert!(report.warnings.iter().any(|w| w.contains("simplif")));
 }
+
+#[test]
+fn a_large_tangle_is_clustered_within_seconds() {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let n = 300_000;
+    let soup = TriangleSoup {
+        vertices: (0..n)
+            .map(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)))
+            .collect(),
+        faces: (0..2 * n)
+            .map(|_| std::array::from_fn(|_| rng.random_range(0..n)))
+            .collect(),
+    };
+    let clock = Instant::now();
+    let (mesh, report) = prepare(soup, &PrepareOptions::default()).unwrap();
+    let took = clock.elapsed().as_secs_f64();
+    eprintln!(
+        "{} faces → {} vertices in {took:.2} s",
+        report.input_faces, report.vertices
+    );
+    assert_prepared(&mesh, &report);
+    assert!((1000..=2000).contains(&report.vertices), "{}", report.vertices);
+    assert_eq!(report.holes_filled, 0, "loops in a tangle bound no holes");
+    assert!(report.warnings.iter().any(|w| w.contains("clustered")));
+    assert!(
+        took < 20.0,
+        "collapses over the whole would take minutes: {took:.1} s"
+    );
+}
