@@ -4,6 +4,7 @@ use super::clean::{Cleaned, clean_again, drop_unreferenced};
 use super::locality::order_along_curve;
 use super::orient::orient;
 use super::pieces::collapse_in_pieces;
+use super::tangle::{MOST_PAIRS, is_tangle, pairs};
 use super::{Components, MeshError};
 use crate::cancel::{Cancel, Cancelled};
 use meshopt::{SimplifyOptions, simplify_decoder, simplify_sloppy_decoder};
@@ -92,7 +93,9 @@ pub(super) fn simplify_to(
         ),
     ];
     for (options, outcome) in steps {
-        if !collapse_in_pieces(mesh, 2 * size, options, cancel)? {
+        let reduced = collapse_in_pieces(mesh, 2 * size, options, cancel)?;
+        // On a large tangle, a random complex say, collapses over the whole would take minutes.
+        if !reduced && is_tangle(mesh.vertices.len(), &mesh.faces) {
             continue;
         }
         collapse(mesh, size, options, cancel)?;
@@ -106,7 +109,7 @@ pub(super) fn simplify_to(
     Ok(Simplified::ByClustering)
 }
 
-/// Edge collapses until at most `size` vertices are left or no collapse is possible.
+/// Edge collapses until at most `size` vertices are left or no collapse is possible, or a hub makes them too slow.
 ///
 /// The library counts faces, we count vertices. A collapse inside takes two faces with its vertex, one on a border a
 /// single face, a face on its own has three vertices, and how many of each there will be is not known. So the first
@@ -133,6 +136,9 @@ fn collapse(
             f.saturating_sub((0.9 * faces_per_vertex * excess).ceil() as usize)
         };
         let indices: Vec<u32> = mesh.faces.iter().flatten().copied().collect();
+        if pairs(v, &indices) > MOST_PAIRS {
+            return Ok(());
+        }
         let result = simplify_decoder(
             &indices,
             &single_precision(&mesh.vertices),

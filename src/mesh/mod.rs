@@ -23,6 +23,7 @@ pub mod refine;
 mod scan;
 pub mod soup;
 pub mod stl;
+mod tangle;
 pub mod trimesh;
 pub mod weld;
 pub mod whiten;

@@ -2,6 +2,7 @@
 
 use super::clean::{Cleaned, drop_unreferenced};
 use super::decimate::{ANY_ERROR, single_precision};
+use super::tangle::pairs;
 use crate::cancel::{Cancel, Cancelled};
 use meshopt::{SimplifyOptions, simplify_decoder};
 use rayon::prelude::*;
@@ -17,6 +18,8 @@ const KEPT: f64 = 0.25;
 const RESERVE: f64 = 4.0;
 /// A round that would leave more than this share does not pay.
 const WORTHWHILE: f64 = 0.6;
+/// A piece with more [`pairs`] of faces at its vertices stays as it is: it would take longer than some ten milliseconds.
+const MOST_PAIRS: u64 = 10_000_000;
 
 /// Reduces a mesh of many faces, whose faces lie along a curve, towards `faces` faces, and stops well above.
 ///
@@ -24,8 +27,8 @@ const WORTHWHILE: f64 = 0.6;
 /// next round's runs are longer, so their borders are elsewhere. Pieces are independent: they are worked on in parallel,
 /// the result does not depend on the number of threads, and a cancelled one waits for no more than a piece.
 ///
-/// False where a round hardly helps and many faces are left: almost all edges are borders of pieces or places where
-/// collapses are not possible. On such a mesh, a random complex say, collapses over the whole would take minutes.
+/// False where a round hardly helps and many faces are left: almost all edges are borders or places where collapses are
+/// not possible.
 pub(super) fn collapse_in_pieces(
     mesh: &mut Cleaned,
     faces: usize,
@@ -68,6 +71,9 @@ fn collapse_piece(
     // Every corner is among `used`.
     let place = |v: &u32| used.binary_search(v).unwrap_or_default() as u32;
     let indices: Vec<u32> = piece.as_flattened().iter().map(place).collect();
+    if pairs(used.len(), &indices) > MOST_PAIRS {
+        return piece.to_vec();
+    }
     let corners: Vec<[f64; 3]> = used.iter().map(|&v| vertices[v as usize]).collect();
     let target = (kept * piece.len() as f64) as usize;
     let options = options | SimplifyOptions::LockBorder;

@@ -261,3 +261,41 @@ fn a_large_tangle_is_clustered_within_seconds() {
         "collapses over the whole would take minutes: {took:.1} s"
     );
 }
+
+#[test]
+fn a_large_ribbon_and_a_large_fan_are_simplified() {
+    // No collapse is possible in a piece of a ribbon of one triangle's width, whose edges are all on the border.
+    let n = 200_000u32;
+    let ribbon = TriangleSoup {
+        vertices: (0..n)
+            .map(|i| {
+                let turn = f64::from(i / 2) * 20.0 / f64::from(n);
+                [turn.cos(), turn.sin(), 0.1 * turn + 0.02 * f64::from(i % 2)]
+            })
+            .collect(),
+        faces: (2..n).map(|i| [i - 2, i - 1, i]).collect(),
+    };
+    let fan = TriangleSoup {
+        vertices: (0..=n)
+            .map(|i| {
+                let turn = f64::from(i) / f64::from(n) * std::f64::consts::TAU;
+                let r = f64::from(i.min(1));
+                [r * turn.cos(), r * turn.sin(), 0.3 * r * (5.0 * turn).sin()]
+            })
+            .collect(),
+        faces: (1..=n).map(|i| [0, i, i % n + 1]).collect(),
+    };
+    for (name, soup) in [("ribbon", ribbon), ("fan", fan)] {
+        let (_, full) = prepare_full(soup.clone());
+        let (mesh, report) = prepare(soup, &PrepareOptions::default()).unwrap();
+        assert_prepared(&mesh, &report);
+        assert!(
+            (1500..=2000).contains(&report.vertices),
+            "{name}: {}",
+            report.vertices
+        );
+        assert!(report.faces + 4 >= report.vertices, "{name} is still one piece");
+        let ratio = report.area / full.area;
+        assert!((0.95..1.05).contains(&ratio), "{name}: {ratio}");
+    }
+}

@@ -1,0 +1,33 @@
+//! Where edge collapses cost too much for what they give.
+
+use super::edges::edge_census;
+
+/// Most pairs of faces at a vertex, summed over the vertices, that a call of the collapses may look at (see [`pairs`]).
+/// A thousandth of it takes about a millisecond; a vertex of 14 000 faces alone makes as many.
+pub(super) const MOST_PAIRS: u64 = 200_000_000;
+
+/// Share of the vertices that may lie where a mesh is no surface.
+const IRREGULAR: f64 = 0.01;
+
+/// Σ deg(v)² over the vertices, deg(v) the number of faces at v: to tell borders from other edges, the collapses look
+/// through all edges of a vertex for each of them. It is some 36 per vertex of a surface, but a hub of a million faces
+/// makes 10¹².
+pub(super) fn pairs(vertices: usize, corners: &[u32]) -> u64 {
+    let mut degree = vec![0u64; vertices];
+    for &v in corners {
+        degree[v as usize] += 1;
+    }
+    degree.iter().map(|d| d * d).sum()
+}
+
+/// Whether hardly any collapse is possible while each round of looking for them is as long as on a surface: at many
+/// vertices more than two border edges meet, or an edge has more than two faces.
+pub(super) fn is_tangle(vertices: usize, faces: &[[u32; 3]]) -> bool {
+    let census = edge_census(vertices, faces);
+    let mut borders = vec![0u8; vertices];
+    for &v in census.boundary.as_flattened() {
+        borders[v as usize] = borders[v as usize].saturating_add(1);
+    }
+    let irregular = borders.iter().filter(|&&b| b > 2).count() + census.non_manifold;
+    irregular as f64 > IRREGULAR * vertices as f64
+}
