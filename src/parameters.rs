@@ -22,12 +22,13 @@ pub struct ParameterError {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Preset {
-    /// What a newcomer should use: n 200, M 100, unit √WKS, L 128, holes filled, ranked by objective.
+    /// What a newcomer should use: n 200, M 60, unit √WKS, L 128, holes filled, open queries doubled too (method,
+    /// step 10), ranked by objective.
     #[default]
     Default,
     /// The paper's literal setting: n 200, M 500, unit WKS, L 500, nothing filled, ranked by Eq. 5.
     Paper,
-    /// `default` with the affine-whitened and the doubled-open-surface hypotheses (method, step 10).
+    /// `default` with the affine-whitened hypothesis (method, step 10), for stretched shapes.
     Robust,
     /// `default` with less of everything, for answers within some 20 ms: 1000 vertices, n 130, L 64, 600
     /// signatures of a training shape and 200 of a query.
@@ -141,7 +142,7 @@ impl Parameters {
             refine_below: 1000,
             eigenpairs: 200,
             descriptor: Descriptor::Wks,
-            energies: 100,
+            energies: 60,
             sigma_steps: 6.0,
             range: WksRange::Code,
             normalisation: Normalisation::SqrtUnit,
@@ -152,7 +153,7 @@ impl Parameters {
             samples_per_shape: 900,
             query_samples: 0,
             rank_by: RankBy::Objective,
-            hypotheses: vec![Hypothesis::Plain],
+            hypotheses: vec![Hypothesis::Plain, Hypothesis::Doubled],
             per_shape: false,
             seed: 1,
         };
@@ -167,6 +168,7 @@ impl Parameters {
                 atoms: 500,
                 samples_per_shape: 0,
                 rank_by: RankBy::Frobenius,
+                hypotheses: vec![Hypothesis::Plain],
                 ..default
             },
             Preset::Robust => Self {

@@ -84,11 +84,11 @@ impl Specimen {
         let mut solved: Vec<Solved> = Vec::new();
         let mut spectra = Vec::new();
         let mut seen = Vec::new();
-        // Those of several hypotheses need more than a plain spectrum, which then serves the others too.
+        // Those that whiten need a spectrum more than the others, whom they then serve too.
         let mut places = vec![0; coding.len()];
-        let (plain, several): (Vec<_>, Vec<_>) =
-            (0..coding.len()).partition(|&i| coding[i].hypotheses == [Hypothesis::Plain]);
-        for i in several.into_iter().chain(plain) {
+        let (whitened, others): (Vec<_>, Vec<_>) =
+            (0..coding.len()).partition(|&i| coding[i].hypotheses.contains(&Hypothesis::Whitened));
+        for i in whitened.into_iter().chain(others) {
             places[i] = solve(soup, &coding[i], &mut solved, &mut spectra, cancel)?;
         }
         for (parameters, at) in coding.iter().zip(places) {

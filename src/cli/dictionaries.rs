@@ -184,14 +184,16 @@ mod tests {
     fn exported() -> Exported {
         let atoms = Mat::from_fn(3, 2, |i, j| if i == j { 1.0 } else { 0.0 });
         let dictionary = Arc::new(Dictionary::new(atoms).unwrap());
+        let parameters = Parameters::default();
+        let channels = parameters.channels();
         let class = |label: &str| IndexedClass {
             label: label.to_owned(),
-            dictionaries: BTreeMap::from([(Channel::Plain, dictionary.clone())]),
+            dictionaries: channels.iter().map(|&c| (c, dictionary.clone())).collect(),
             shapes: Vec::new(),
         };
         Exported {
             index: Index {
-                parameters: Parameters::default(),
+                parameters: parameters.clone(),
                 classes: vec![class("cat"), class("great dane/old")],
             },
             classes: ["cat", "great dane/old"]

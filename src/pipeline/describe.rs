@@ -45,7 +45,7 @@ pub fn describe_query(
     cancel: &Cancel,
     observer: &dyn Fn(Stage),
 ) -> Result<Description, PipelineError> {
-    let mut shape = PreparedShape::new(soup, parameters, cancel, observer)?;
+    let mut shape = PreparedShape::query(soup, parameters, cancel, observer)?;
     let views = shape.query_views(parameters, cancel)?;
     Ok(shape.into_description(views))
 }

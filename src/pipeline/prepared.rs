@@ -46,26 +46,61 @@ pub fn refined_to(report: &PrepareReport, parameters: &Parameters) -> usize {
     }
 }
 
+/// Whether a query is compared as a part of a shape: it is open, and the parameters ask for that hypothesis.
+///
+/// Then all of its views are coded under the dictionaries of the fixed grid, so that the errors of the doubled surface
+/// compare with those of the surface as it is; and it is not whitened, as a part's moments are not the whole's.
+fn taken_as_part(report: &PrepareReport, parameters: &Parameters) -> bool {
+    report.openness > OPEN_ABOVE && parameters.hypotheses.contains(&Hypothesis::Doubled)
+}
+
 /// A mesh with the spectra its views are taken from.
 #[derive(Clone, Debug)]
 pub struct PreparedShape {
     mesh: TriMesh,
     operators: Operators,
     eigenpairs: Eigenpairs,
-    /// Of the whitened mesh, where the parameters ask for that hypothesis. Without it a query can still be compared.
+    /// Of the whitened mesh, where it is wanted. Without it a query can still be compared.
     whitened: Option<Result<Eigenpairs, PipelineError>>,
     report: PrepareReport,
 }
 
 impl PreparedShape {
     /// Cleans a mesh and solves for its spectrum; with the whitened hypothesis also for the whitened mesh's, at the
-    /// same time where the thread pool has room.
+    /// same time where the thread pool has room. For a training shape, which may be a query too.
     ///
     /// # Errors
     /// The error of the stage that failed, or [`PipelineError::Cancelled`].
     pub fn new(
         soup: TriangleSoup,
         parameters: &Parameters,
+        cancel: &Cancel,
+        observer: &dyn Fn(Stage),
+    ) -> Result<Self, PipelineError> {
+        let whitened = |_: &PrepareReport| parameters.hypotheses.contains(&Hypothesis::Whitened);
+        Self::solve(soup, parameters, whitened, cancel, observer)
+    }
+
+    /// As [`new`](Self::new), for a query: what its views do not need is not solved for.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn query(
+        soup: TriangleSoup,
+        parameters: &Parameters,
+        cancel: &Cancel,
+        observer: &dyn Fn(Stage),
+    ) -> Result<Self, PipelineError> {
+        let whitened = |report: &PrepareReport| {
+            parameters.hypotheses.contains(&Hypothesis::Whitened) && !taken_as_part(report, parameters)
+        };
+        Self::solve(soup, parameters, whitened, cancel, observer)
+    }
+
+    fn solve(
+        soup: TriangleSoup,
+        parameters: &Parameters,
+        whitened: impl Fn(&PrepareReport) -> bool,
         cancel: &Cancel,
         observer: &dyn Fn(Stage),
     ) -> Result<Self, PipelineError> {
@@ -79,7 +114,7 @@ impl PreparedShape {
         let solve = |operators: &Operators| {
             smallest_eigenpairs(operators, parameters.eigenpairs, &EigenOptions::default(), cancel)
         };
-        let (eigenpairs, whitened) = if parameters.hypotheses.contains(&Hypothesis::Whitened) {
+        let (eigenpairs, whitened) = if whitened(&report) {
             let (plain, whitened) = rayon::join(
                 || solve(&operators),
                 || -> Result<Eigenpairs, PipelineError> { Ok(solve(&assemble(&whiten(&mesh)?)?)?) },
@@ -121,7 +156,9 @@ impl PreparedShape {
             match hypothesis {
                 Hypothesis::Plain => views.push(self.plain(&vertices, parameters)?),
                 Hypothesis::Whitened => views.extend(self.whitened(&vertices, parameters)?),
-                Hypothesis::Doubled => views.push(self.fixed_grid(&vertices, parameters)?),
+                Hypothesis::Doubled => {
+                    views.push(self.fixed_grid(&vertices, parameters, Hypothesis::Doubled)?);
+                }
             }
         }
         Ok(views)
@@ -138,20 +175,24 @@ impl PreparedShape {
         cancel: &Cancel,
     ) -> Result<Vec<View>, PipelineError> {
         let vertices = self.sample(parameters.query_samples, parameters.seed);
+        let part = taken_as_part(&self.report, parameters);
         let mut views = Vec::new();
         for hypothesis in &parameters.hypotheses {
             let (seen, what) = match hypothesis {
                 Hypothesis::Plain => {
-                    views.push(self.plain(&vertices, parameters)?);
+                    views.push(if part {
+                        self.fixed_grid(&vertices, parameters, Hypothesis::Plain)?
+                    } else {
+                        self.plain(&vertices, parameters)?
+                    });
                     continue;
                 }
+                Hypothesis::Whitened if part => continue,
                 Hypothesis::Whitened => {
                     let whitened = self.whitened(&vertices, parameters);
                     (whitened.map(Vec::from_iter), "affinely normalised")
                 }
-                Hypothesis::Doubled if self.report.openness > OPEN_ABOVE => {
-                    (self.doubled(&vertices, parameters, cancel), "as a part")
-                }
+                Hypothesis::Doubled if part => (self.doubled(&vertices, parameters, cancel), "as a part"),
                 Hypothesis::Doubled => continue,
             };
             match seen {
@@ -186,12 +227,17 @@ impl PreparedShape {
         )
     }
 
-    fn fixed_grid(&self, vertices: &[u32], parameters: &Parameters) -> Result<View, PipelineError> {
+    fn fixed_grid(
+        &self,
+        vertices: &[u32],
+        parameters: &Parameters,
+        hypothesis: Hypothesis,
+    ) -> Result<View, PipelineError> {
         view(
             &self.eigenpairs,
             vertices,
             parameters,
-            Hypothesis::Doubled,
+            hypothesis,
             Channel::FixedGrid,
             1.0,
         )

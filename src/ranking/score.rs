@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 /// What a class whitened by its second moments must be better by, in units of the mean objective: the prior against
 /// the less specific hypothesis (method, step 10).
-const WHITENED_OFFSET: f64 = 0.001;
+const WHITENED_OFFSET: f64 = 0.0003;
 /// What an open query taken as it is must be better by.
 const OPEN_PLAIN_OFFSET: f64 = 0.001;
 /// Temperature τ of the soft minimum over the areas assumed for a doubled surface.
@@ -120,7 +120,7 @@ pub struct Score {
 
 /// Codes every view under the dictionary of its channel and combines the hypotheses.
 ///
-/// With p = min(m₀, m₁ + 0.001): the score is p, or for an open query min(p + 0.001, m₂), m₂ the soft minimum
+/// With p = min(m₀, m₁ + 0.0003): the score is p, or for an open query min(p + 0.001, m₂), m₂ the soft minimum
 /// −τ ln mean exp(−m/τ) over the areas assumed (method, step 10). Offsets are in units of the mean objective, so a
 /// ranking by Eq. 5 knows the plain hypothesis only.
 pub fn score(

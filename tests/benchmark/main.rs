@@ -6,8 +6,8 @@ use shapelex::benchmark::{LabelledShape, Protocol, Specimen, evaluate};
 use shapelex::cancel::Cancel;
 use shapelex::mesh::trimesh::face_area;
 use shapelex::mesh::{Components, PrepareOptions, PrepareReport, TriangleSoup, prepare};
-use shapelex::parameters::{Parameters, Preset};
-use shapelex::pipeline::{PreparedShape, describe_both};
+use shapelex::parameters::{Channel, Hypothesis, Parameters, Preset};
+use shapelex::pipeline::{PreparedShape, describe_both, describe_query};
 use shapelex::sample::{Species, ZooOptions};
 use std::collections::BTreeSet;
 
@@ -224,10 +224,17 @@ fn the_robust_preset_undoes_affine_maps_of_a_known_mesh_and_sees_views() {
     )
     .unwrap();
     assert_eq!((answer.correct, answer.total), (3, 3), "{:?}", answer.queries);
-    // A view is open, so it is described under the areas assumed too.
+    // A view is open, so it is described as it is and under the areas assumed, all on the fixed grid.
     let view = Deformation::View.apply(&creature(4, 0), 1, 5);
-    let (_, query) = describe_both(view, &robust, &Cancel::new()).unwrap();
-    assert_eq!(query.views.len(), 6, "plain, whitened, and four areas");
+    let (training, query) = describe_both(view.clone(), &robust, &Cancel::new()).unwrap();
+    assert_eq!(training.views.len(), 3, "a dictionary is learnt for each channel");
+    let alone = describe_query(view, &robust, &Cancel::new(), &|_| ()).unwrap();
+    for views in [&query.views, &alone.views] {
+        let seen: Vec<_> = views.iter().map(|v| (v.hypothesis, v.channel)).collect();
+        let mut expected = vec![(Hypothesis::Doubled, Channel::FixedGrid); 5];
+        expected[0].0 = Hypothesis::Plain;
+        assert_eq!(seen, expected);
+    }
 }
 
 #[test]
@@ -238,7 +245,7 @@ fn a_specimen_serves_presets_of_few_and_of_many_hypotheses_in_any_order() {
         training: true,
         query: true,
     };
-    for (which, channels, hypotheses) in [(0, 1, 1), (1, 3, 2), (2, 1, 1)] {
+    for (which, channels, hypotheses) in [(0, 2, 1), (1, 3, 2), (2, 1, 1)] {
         let (training, query) = specimen.descriptions(which, &coding[which], wanted).unwrap();
         assert_eq!(
             (training.views.len(), query.views.len()),
