@@ -151,7 +151,7 @@ impl Parameters {
             iterations: 25,
             batch: 256,
             samples_per_shape: 900,
-            query_samples: 0,
+            query_samples: 900,
             rank_by: RankBy::Objective,
             hypotheses: vec![Hypothesis::Plain, Hypothesis::Doubled],
             per_shape: false,
@@ -167,6 +167,7 @@ impl Parameters {
                 normalisation: Normalisation::Unit,
                 atoms: 500,
                 samples_per_shape: 0,
+                query_samples: 0,
                 rank_by: RankBy::Frobenius,
                 hypotheses: vec![Hypothesis::Plain],
                 ..default

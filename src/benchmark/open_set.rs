@@ -4,6 +4,7 @@
 use super::evaluate::LabelledShape;
 use crate::cancel::Cancel;
 use crate::parameters::Parameters;
+use crate::pipeline::prepared::OPEN_ABOVE;
 use crate::pipeline::{Description, PipelineError, held_out_scores, learn_model};
 use crate::ranking::{Calibration, Index, IndexedClass, SIGNIFICANCE, rank};
 use rand::SeedableRng;
@@ -76,7 +77,8 @@ impl OpenSet {
 }
 
 /// Half of every class trains, drawn by the seed, and the other half is queried. Then one class after the other is left
-/// out of the index and all its shapes are queried. Groups of `same` count as one class and are left out together.
+/// out of the index and all its shapes are queried. Open shapes train but are not queried, as no answer about them is
+/// judged. Groups of `same` count as one class and are left out together.
 /// `None` where too few shapes train to calibrate anything.
 ///
 /// # Errors
@@ -108,7 +110,8 @@ pub fn evaluate_open_set(
         dealt.sort_unstable();
         train.insert(class, dealt);
     }
-    let queried: Vec<usize> = members.values().flatten().copied().collect();
+    let judged = |i: &usize| shapes[*i].query.report.openness <= OPEN_ABOVE;
+    let queried: Vec<usize> = members.values().flatten().copied().filter(judged).collect();
     let total = train.len() + queried.len();
     let done = std::sync::atomic::AtomicUsize::new(0);
     let tick = || progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, total);
