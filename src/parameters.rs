@@ -73,7 +73,7 @@ pub enum Channel {
     Plain,
     /// The same of the whitened shape.
     Whitened,
-    /// WKS on the fixed energy grid, which the doubled surfaces are compared on.
+    /// WKS on the fixed energy grid, which open queries are compared on, doubled and as they are.
     FixedGrid,
 }
 

@@ -77,8 +77,7 @@ impl PreparedShape {
         cancel: &Cancel,
         observer: &dyn Fn(Stage),
     ) -> Result<Self, PipelineError> {
-        let whitened = |_: &PrepareReport| parameters.hypotheses.contains(&Hypothesis::Whitened);
-        Self::solve(soup, parameters, whitened, cancel, observer)
+        Self::solve(soup, parameters, true, cancel, observer)
     }
 
     /// As [`new`](Self::new), for a query: what its views do not need is not solved for.
@@ -91,16 +90,13 @@ impl PreparedShape {
         cancel: &Cancel,
         observer: &dyn Fn(Stage),
     ) -> Result<Self, PipelineError> {
-        let whitened = |report: &PrepareReport| {
-            parameters.hypotheses.contains(&Hypothesis::Whitened) && !taken_as_part(report, parameters)
-        };
-        Self::solve(soup, parameters, whitened, cancel, observer)
+        Self::solve(soup, parameters, false, cancel, observer)
     }
 
     fn solve(
         soup: TriangleSoup,
         parameters: &Parameters,
-        whitened: impl Fn(&PrepareReport) -> bool,
+        parts_whitened: bool,
         cancel: &Cancel,
         observer: &dyn Fn(Stage),
     ) -> Result<Self, PipelineError> {
@@ -114,7 +110,9 @@ impl PreparedShape {
         let solve = |operators: &Operators| {
             smallest_eigenpairs(operators, parameters.eigenpairs, &EigenOptions::default(), cancel)
         };
-        let (eigenpairs, whitened) = if whitened(&report) {
+        let whitened = parameters.hypotheses.contains(&Hypothesis::Whitened)
+            && (parts_whitened || !taken_as_part(&report, parameters));
+        let (eigenpairs, whitened) = if whitened {
             let (plain, whitened) = rayon::join(
                 || solve(&operators),
                 || -> Result<Eigenpairs, PipelineError> { Ok(solve(&assemble(&whiten(&mesh)?)?)?) },
