@@ -17,6 +17,7 @@ mod catalogue_log;
 mod dictionaries;
 pub mod error;
 mod event;
+mod failure;
 mod files;
 #[cfg(any(test, feature = "fuzzing"))]
 #[doc(hidden)]
@@ -54,6 +55,7 @@ pub use usage::Usage;
 use backend::Batch;
 use catalogue_log::CatalogueLog;
 use event::Event;
+use failure::Failure;
 use payload::Number;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -117,8 +119,7 @@ struct Inner {
     pinned: Mutex<snapshot::Pinned>,
     /// Held by whoever makes or restores a snapshot: one at a time.
     snapshots: Mutex<()>,
-    /// The first failed write.
-    failure: Mutex<Option<StoreError>>,
+    failure: Arc<Failure>,
     recovery: Vec<String>,
     /// Released when the last clone is dropped.
     _lock: File,
@@ -136,30 +137,13 @@ impl Inner {
         self.writer.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn failure(&self) -> MutexGuard<'_, Option<StoreError>> {
-        // Assigned whole, never half.
-        self.failure.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn writable(&self) -> Result<(), StoreError> {
-        match &*self.failure() {
-            None => Ok(()),
-            Some(known @ (StoreError::Full { .. } | StoreError::RecoveryMode { .. })) => Err(known.clone()),
-            Some(other) => Err(StoreError::ReadOnly {
-                why: other.to_string(),
-            }),
-        }
+        self.failure.writable()
     }
 
     /// Remembers that a write failed; from now on all are refused.
     fn fail(&self, error: StoreError) -> StoreError {
-        tracing::error!(%error, "a write failed; the store is read-only now");
-        if matches!(error, StoreError::Full { .. }) {
-            recover::release_reserve(&self.path);
-        }
-        // Only the first failure is kept.
-        self.failure().get_or_insert_with(|| error.clone());
-        error
+        self.failure.remember(error)
     }
 
     /// Applies a batch, and waits for the disk where it must be durable.
@@ -168,6 +152,8 @@ impl Inner {
         self.backend.apply(batch).map_err(|e| self.fail(e))?;
         if durable {
             self.backend.flush().map_err(|e| self.fail(e))?;
+            // A read that met a full disk in between has opened the engine anew, maybe without the batch.
+            self.writable()?;
         }
         Ok(())
     }
@@ -211,7 +197,7 @@ impl Store {
 
     /// Whether the store takes writes; readiness asks.
     pub fn health(&self) -> Health {
-        match &*self.inner.failure() {
+        match self.inner.failure.get() {
             None => Health::Ready,
             Some(why) => Health::ReadOnly { why: why.to_string() },
         }
@@ -223,13 +209,13 @@ impl Store {
             why,
             "recovery mode: the catalogue is served, and nothing is changed"
         );
-        *self.inner.failure() = Some(StoreError::RecoveryMode { why });
+        self.inner.failure.replace(Some(StoreError::RecoveryMode { why }));
     }
 
     /// Why the store is in recovery mode; `None` where it is not.
     pub fn recovery_mode(&self) -> Option<String> {
-        match &*self.inner.failure() {
-            Some(StoreError::RecoveryMode { why }) => Some(why.clone()),
+        match self.inner.failure.get() {
+            Some(StoreError::RecoveryMode { why }) => Some(why),
             _ => None,
         }
     }

@@ -3,10 +3,9 @@
 use super::backend::{Backend, Batch};
 use super::catalogue_log::{self, CatalogueLog, LogScan};
 use super::event::{self, Event, get, put, shapes_of};
+use super::failure::Failure;
 use super::payload::Number;
-use super::{
-    Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, rebuild, recover, snapshot,
-};
+use super::{Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, rebuild, snapshot};
 use crate::model::Class;
 use std::fs::{File, TryLockError};
 use std::path::Path;
@@ -28,11 +27,13 @@ impl Store {
         let lock = prepare(path)?;
         let mut recovery = Vec::new();
         // A disk that is full still opens, if it can: with what the reserve held.
-        recover::release_reserve(path);
-        let backend = rebuild::open_records(path, options, &mut recovery)?;
-        let store = finish(path, Arc::new(backend), lock, recovery)?;
-        if let Err(error) = recover::take_reserve(path) {
-            tracing::warn!(%error, "there is no space for the reserve of disk space");
+        let failure = Arc::new(Failure::none(path));
+        failure.give_up_reserve();
+        let backend = rebuild::open_records(path, options, &failure, &mut recovery)?;
+        let store = finish(path, Arc::new(backend), lock, failure, recovery)?;
+        // Read-only until there is space, where there is none.
+        if let Err(error) = store.inner.failure.take_reserve() {
+            store.inner.fail(error);
         }
         Ok(store)
     }
@@ -44,7 +45,7 @@ impl Store {
     pub fn open_with(path: &Path, backend: Arc<dyn Backend>) -> Result<Self, StoreError> {
         let lock = prepare(path)?;
         rebuild::verify(&*backend)?;
-        finish(path, backend, lock, Vec::new())
+        finish(path, backend, lock, Arc::new(Failure::none(path)), Vec::new())
     }
 }
 
@@ -95,6 +96,7 @@ fn finish(
     path: &Path,
     backend: Arc<dyn Backend>,
     lock: File,
+    failure: Arc<Failure>,
     mut recovery: Vec<String>,
 ) -> Result<Store, StoreError> {
     let writer = settle(path, &*backend, &mut recovery)?;
@@ -109,7 +111,7 @@ fn finish(
             files: RwLock::new(()),
             pinned: Mutex::default(),
             snapshots: Mutex::new(()),
-            failure: Mutex::new(None),
+            failure,
             recovery,
             _lock: lock,
         }),

@@ -5,6 +5,7 @@
 
 use super::backend::{Backend, Batch, Entry};
 use super::event::{files_of, get};
+use super::failure::Failure;
 use super::open::{LOG, replay};
 use super::payload::Number;
 use super::sled_backend::SledBackend;
@@ -12,6 +13,7 @@ use super::{StoreError, StoreOptions, files, keys, migrate, record};
 use crate::model::Generation;
 use jiff::Timestamp;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Records checked per scan.
 const CHUNK: usize = 256;
@@ -31,6 +33,7 @@ const CARRIED: [&[u8]; 7] = [
 pub(super) fn open_records(
     data: &Path,
     options: &StoreOptions,
+    failure: &Arc<Failure>,
     recovery: &mut Vec<String>,
 ) -> Result<SledBackend, StoreError> {
     let sled = data.join("sled");
@@ -38,7 +41,7 @@ pub(super) fn open_records(
     if data.join("sled.rebuilt").exists() {
         put_in_place(data, recovery)?;
     }
-    let (damage, salvaged) = match SledBackend::open(&sled, options.cache_bytes) {
+    let (damage, salvaged) = match SledBackend::open(&sled, options.cache_bytes, failure.clone()) {
         Ok(backend) => match verify(&backend) {
             Ok(()) => return Ok(backend),
             Err(damage @ StoreError::Damaged { .. }) => (damage, salvage(&backend)),
@@ -59,7 +62,7 @@ pub(super) fn open_records(
     ));
     rebuild(data, options, salvaged, recovery)?;
     put_in_place(data, recovery)?;
-    SledBackend::open(&sled, options.cache_bytes)
+    SledBackend::open(&sled, options.cache_bytes, failure.clone())
 }
 
 /// Checks the envelope of every record.
@@ -98,7 +101,8 @@ fn rebuild(
     recovery: &mut Vec<String>,
 ) -> Result<(), StoreError> {
     let building = data.join("sled.rebuilding");
-    let backend = SledBackend::open(&building, options.cache_bytes)?;
+    // One that meets a full disk gives up: nothing of what is being made is needed yet.
+    let backend = SledBackend::open(&building, options.cache_bytes, Arc::new(Failure::none(&building)))?;
     migrate::run(&backend)?;
     let carried = salvaged.len();
     for chunk in salvaged.chunks(CHUNK) {

@@ -2,10 +2,11 @@
 
 use super::StoreError;
 use super::backend::{Backend, Batch, Entry, prefix_end};
+use super::failure::Failure;
 use std::ops::Bound;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::{PoisonError, RwLock};
+use std::sync::{Arc, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
 /// How long a directory is tried again that the engine just closed: its own threads let go of it a little later.
@@ -15,45 +16,59 @@ const OPEN_WITHIN: Duration = Duration::from_secs(10);
 pub struct SledBackend {
     path: PathBuf,
     cache_bytes: u64,
-    /// `None` only where opening it again failed.
-    db: RwLock<Option<sled::Db>>,
+    /// Why it is not open, only where opening it again failed.
+    db: RwLock<Result<sled::Db, StoreError>>,
+    failure: Arc<Failure>,
 }
 
 impl SledBackend {
-    /// Opens or creates the engine's directory.
+    /// Opens or creates the engine's directory. A read that meets a full disk tells `failure`.
     ///
     /// # Errors
     /// Whatever keeps sled from opening it. sled can panic on a damaged directory; that is caught and is an error
     /// like the others.
-    pub fn open(path: &Path, cache_bytes: u64) -> Result<Self, StoreError> {
+    pub fn open(path: &Path, cache_bytes: u64, failure: Arc<Failure>) -> Result<Self, StoreError> {
         Ok(Self {
             path: path.to_owned(),
             cache_bytes,
-            db: RwLock::new(Some(open(path, cache_bytes)?)),
+            db: RwLock::new(Ok(open(path, cache_bytes)?)),
+            failure,
         })
     }
 
     fn with<T>(&self, what: &str, work: impl FnOnce(&sled::Db) -> sled::Result<T>) -> Result<T, StoreError> {
         let db = self.db.read().unwrap_or_else(PoisonError::into_inner);
         match &*db {
-            Some(db) => caught(what, || work(db)),
-            None => Err(StoreError::Io {
-                what: what.to_owned(),
-                detail: "the key-value store could not be opened again".to_owned(),
-            }),
+            Ok(db) => caught(what, || work(db)),
+            Err(why) => Err(why.clone()),
         }
     }
 
     /// Like [`with`](Self::with), for reads. The engine finishes what a write left undone when it reads, and after a
-    /// write that met a full disk it repeats that failure on and on; opened anew, it reads.
+    /// write that met a full disk it repeats that failure on and on; opened anew, with the space of the reserve, it
+    /// reads.
     fn read<T>(&self, what: &str, work: impl Fn(&sled::Db) -> sled::Result<T>) -> Result<T, StoreError> {
+        let full = match self.with(what, &work) {
+            Err(full @ StoreError::Full { .. }) => full,
+            done => return done,
+        };
+        let _space = self.failure.hold_space();
+        self.failure.remember(full);
+        // Another read may have opened it meanwhile.
         match self.with(what, &work) {
-            Err(StoreError::Full { .. }) => {
-                self.reopen(&mut || Ok(()))?;
-                self.with(what, work)
-            }
-            done => done,
+            Err(StoreError::Full { .. }) => {}
+            done => return done,
         }
+        self.reopen(&mut || Ok(()))?;
+        self.with(what, work)
+    }
+}
+
+/// What stands in the engine's place for as long as nothing is open; nobody sees it but after a panic.
+fn closed() -> StoreError {
+    StoreError::Io {
+        what: "use the key-value store".to_owned(),
+        detail: "it was closed and not opened again".to_owned(),
     }
 }
 
@@ -218,17 +233,20 @@ impl Backend for SledBackend {
 
     fn reopen(&self, meanwhile: &mut dyn FnMut() -> Result<(), StoreError>) -> Result<(), StoreError> {
         let mut db = self.db.write().unwrap_or_else(PoisonError::into_inner);
-        let closing = db.take();
+        let closing = std::mem::replace(&mut *db, Err(closed()));
         // Closing flushes, and after a failure that may fail or panic again; what counts is what is opened below.
-        let closed = caught("close the key-value store", || {
+        let done = caught("close the key-value store", || {
             drop(closing);
             Ok(())
         });
-        if let Err(error) = closed {
+        if let Err(error) = done {
             tracing::warn!(%error, "the key-value store was not closed in good order");
         }
         let done = meanwhile();
-        *db = Some(open(&self.path, self.cache_bytes)?);
-        done
+        *db = open(&self.path, self.cache_bytes);
+        match &*db {
+            Ok(_) => done,
+            Err(error) => Err(error.clone()),
+        }
     }
 }

@@ -4,6 +4,7 @@
 //! so no path, link or bomb of somebody else's making reaches the disk.
 
 use super::super::backend::{Backend, Batch, Entry};
+use super::super::failure::Failure;
 use super::super::sled_backend::SledBackend;
 use super::super::{StoreError, StoreOptions, files, originals, record};
 use super::manifest::{CHECKSUM, MANIFEST, MAX_BYTES, Manifest, Member, RECORDS};
@@ -12,6 +13,7 @@ use crate::model::ContentHash;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Write};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Most memory the decoder takes for looking back: zstd's own limit, 128 MiB.
 const WINDOW_LOG: u32 = 27;
@@ -181,7 +183,7 @@ fn sync_folders(directory: &Path) -> Result<(), StoreError> {
 /// Puts the copied records into an engine of their own, each checked.
 fn load(records: &Path, sled: &Path, options: &StoreOptions) -> Result<(), StoreError> {
     let fail = |e: std::io::Error| StoreError::io("read the records of a snapshot", &e);
-    let backend = SledBackend::open(sled, options.cache_bytes)?;
+    let backend = SledBackend::open(sled, options.cache_bytes, Arc::new(Failure::none(sled)))?;
     let mut reader = BufReader::new(File::open(records).map_err(fail)?);
     let (mut batch, mut bytes) = (Batch::default(), 0);
     while let Some((key, value)) = read_record(&mut reader)? {
