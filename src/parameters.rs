@@ -6,6 +6,10 @@ use crate::signature::descriptor::{Descriptor, DescriptorParameters, WksRange};
 use crate::signature::normalise::Normalisation;
 use serde::{Deserialize, Serialize};
 
+/// Goes into the fingerprints, and changes where the same parameters come to describe training shapes differently, so
+/// that what was kept is made anew: 2 since parts are doubled.
+const DESCRIBED: &str = "2";
+
 /// A parameter is outside its range.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{name} must be {expected}, got {found}")]
@@ -44,7 +48,7 @@ impl Preset {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RankBy {
-    /// Mean Lasso objective per signature.
+    /// Mean Lasso objective per signature; the trimmed one where a surface has a boundary.
     #[default]
     Objective,
     /// Mean of the smallest 80 % of the objectives.
@@ -305,7 +309,7 @@ impl Parameters {
             preset: Preset::Default,
             ..part
         };
-        part.digest()
+        part.digest(DESCRIBED)
     }
 
     /// A name, 32 hexadecimal digits, shared by exactly the parameters that learn the same dictionaries from the same
@@ -317,12 +321,13 @@ impl Parameters {
             preset: Preset::Default,
             ..self.clone()
         };
-        part.digest()
+        part.digest(DESCRIBED)
     }
 
-    fn digest(&self) -> String {
+    fn digest(&self, prefix: &str) -> String {
         // A struct of numbers and unit enums always serialises; field order is the declaration's.
-        let bytes = serde_json::to_vec(self).unwrap_or_default();
+        let mut bytes = prefix.as_bytes().to_vec();
+        bytes.extend(serde_json::to_vec(self).unwrap_or_default());
         blake3::hash(&bytes).to_hex()[..32].to_owned()
     }
 }

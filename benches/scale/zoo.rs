@@ -88,6 +88,7 @@ pub fn query(number: usize) -> Outcome<Vec<View>> {
         hypothesis: Hypothesis::Plain,
         channel: Channel::Plain,
         area_scale: 1.0,
+        bounded: false,
         signatures: Signatures {
             vertices: (0..matrix.ncols() as u32).collect(),
             matrix,

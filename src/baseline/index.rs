@@ -212,6 +212,7 @@ mod tests {
                 hypothesis: Hypothesis::Plain,
                 channel: Channel::Plain,
                 area_scale: 1.0,
+                bounded: false,
                 signatures,
             }],
             report: PrepareReport::default(),

@@ -97,6 +97,7 @@ fn thinned(views: &[View]) -> Vec<View> {
                 hypothesis: view.hypothesis,
                 channel: view.channel,
                 area_scale: view.area_scale,
+                bounded: view.bounded,
                 signatures,
             }
         })

@@ -30,6 +30,7 @@ struct StoredView {
     hypothesis: Hypothesis,
     channel: Channel,
     area_scale: f64,
+    bounded: bool,
     vertices: Vec<u32>,
     /// M × N, column by column.
     values: Vec<f32>,
@@ -43,6 +44,7 @@ enum Seen {
         spectrum: usize,
         training: Vec<u32>,
         query: Vec<u32>,
+        bounded: bool,
     },
     /// By several.
     Views {
@@ -98,11 +100,12 @@ impl Specimen {
                     spectrum: at,
                     training: shape.sample(parameters.samples_per_shape, parameters.seed),
                     query: shape.sample(parameters.query_samples, parameters.seed),
+                    bounded: shape.report().openness > 0.0,
                 }
             } else {
                 let store = |views: Vec<View>| views.iter().map(StoredView::of).collect();
                 Seen::Views {
-                    training: store(shape.training_views(parameters)?),
+                    training: store(shape.training_views(parameters, cancel)?),
                     query: store(shape.query_views(parameters, cancel)?),
                 }
             });
@@ -138,6 +141,7 @@ impl Specimen {
                 spectrum,
                 training,
                 query,
+                bounded,
             } => {
                 let pairs = self.spectra[*spectrum].eigenpairs();
                 let plain = |vertices: &[u32]| -> Result<Vec<View>, SpectralError> {
@@ -148,6 +152,7 @@ impl Specimen {
                         hypothesis: Hypothesis::Plain,
                         channel: Channel::Plain,
                         area_scale: 1.0,
+                        bounded: *bounded,
                         signatures,
                     }])
                 };
@@ -259,6 +264,7 @@ impl StoredView {
             hypothesis: view.hypothesis,
             channel: view.channel,
             area_scale: view.area_scale,
+            bounded: view.bounded,
             vertices: view.signatures.vertices.clone(),
             values,
         }
@@ -273,6 +279,7 @@ impl StoredView {
             hypothesis: self.hypothesis,
             channel: self.channel,
             area_scale: self.area_scale,
+            bounded: self.bounded,
             signatures: Signatures {
                 matrix,
                 vertices: self.vertices.clone(),

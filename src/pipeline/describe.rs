@@ -30,7 +30,7 @@ pub fn describe_shape(
     observer: &dyn Fn(Stage),
 ) -> Result<Description, PipelineError> {
     let shape = PreparedShape::new(soup, parameters, cancel, observer)?;
-    let views = shape.training_views(parameters)?;
+    let views = shape.training_views(parameters, cancel)?;
     Ok(shape.into_description(views))
 }
 
@@ -61,7 +61,7 @@ pub fn describe_both(
     cancel: &Cancel,
 ) -> Result<(Description, Description), PipelineError> {
     let mut shape = PreparedShape::new(soup, parameters, cancel, &|_| ())?;
-    let training = shape.training_views(parameters)?;
+    let training = shape.training_views(parameters, cancel)?;
     let query = shape.query_views(parameters, cancel)?;
     let query = Description {
         views: query,

@@ -1,5 +1,6 @@
 //! How well a class fits shapes of its own that it was learnt without: what confidence is calibrated by.
 
+use super::prepared::OPEN_ABOVE;
 use super::{Description, PipelineError, learn_model};
 use crate::cancel::Cancel;
 use crate::parameters::{Hypothesis, Parameters, RankBy};
@@ -9,7 +10,7 @@ use crate::ranking::{View, prepare_views, score};
 const FOLDS: usize = 10;
 
 /// Scores of a class's training shapes, each under dictionaries learnt from the other folds' shapes; in no particular
-/// order. Empty for a single shape, and with a ranking by Eq. 5, whose error grows with the number of vertices, so that
+/// order, but for open ones, which say nothing of whole shapes and are not judged. Empty for a single shape, and with a ranking by Eq. 5, whose error grows with the number of vertices, so that
 /// one shape's says nothing of another's.
 ///
 /// # Errors
@@ -28,7 +29,7 @@ pub fn held_out_scores(
         let (held, rest): (Vec<_>, Vec<_>) = shapes.iter().enumerate().partition(|(i, _)| i % folds == fold);
         let rest: Vec<&Description> = rest.into_iter().map(|(_, shape)| *shape).collect();
         let model = learn_model(&rest, parameters, cancel, &|_, _| ())?;
-        for (_, shape) in held {
+        for (_, shape) in held.into_iter().filter(|(_, s)| s.report.openness <= OPEN_ABOVE) {
             // A training shape's view on the fixed grid is there to be learnt from; as a query it would be open.
             let views: Vec<View> = shape
                 .views

@@ -3,7 +3,8 @@
 use super::{Description, PipelineError};
 use crate::cancel::Cancel;
 use crate::coding::{CodingError, Dictionary, LearnReport, learn};
-use crate::parameters::{Channel, Parameters};
+use crate::parameters::{Channel, Hypothesis, Parameters};
+use crate::ranking::View;
 use faer::MatRef;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -54,12 +55,20 @@ pub fn learn_model(
     Ok(Model { dictionaries, report })
 }
 
-/// The signatures of all shapes in one channel, M × N each.
+/// The signatures of all shapes in one channel, M × N each. A part teaches what its doubled surface looks like; as it
+/// is it only serves the baselines.
 fn signals<'a>(shapes: &[&'a Description], channel: Channel) -> Result<Vec<MatRef<'a, f64>>, CodingError> {
-    let view = |shape: &&'a Description| shape.views.iter().find(|view| view.channel == channel);
-    shapes
-        .iter()
-        .map(|shape| Some(view(shape)?.signatures.matrix.as_ref()))
-        .collect::<Option<_>>()
-        .ok_or(CodingError::NoSignatures)
+    let mut signals = Vec::new();
+    for shape in shapes {
+        let seen: Vec<&View> = shape.views.iter().filter(|v| v.channel == channel).collect();
+        if seen.is_empty() {
+            return Err(CodingError::NoSignatures);
+        }
+        let part = seen.iter().any(|v| v.hypothesis == Hypothesis::Doubled);
+        let wanted = seen
+            .iter()
+            .filter(|v| !part || v.hypothesis == Hypothesis::Doubled);
+        signals.extend(wanted.map(|v| v.signatures.matrix.as_ref()));
+    }
+    Ok(signals)
 }

@@ -16,6 +16,8 @@ pub(super) struct Anchors {
     pub points: Mat<f64>,
     /// (1/N) Σ_i w_ig s_i in column g, M × K.
     pub sums: Mat<f64>,
+    /// Every signal's anchors g and weights w_ig.
+    pub mixtures: Vec<Vec<(u32, f64)>>,
     /// g ≤ h and (1/N) Σ_i w_ig w_ih, counted twice where g < h, for the pairs where that is not zero.
     pub pairs: Vec<(u32, u32, f64)>,
 }
@@ -31,6 +33,7 @@ pub(super) fn anchors(signals: MatRef<'_, f64>, sizes: &[usize]) -> Vec<Anchors>
             let share = (n as f64).recip();
             let mut sums = Mat::zeros(m, k);
             let mut products = vec![0.0; k * k];
+            let mut mixtures = Vec::with_capacity(n);
             for (i, summary) in of_signals.iter().enumerate() {
                 let mixture = mixture(summary, &of_points);
                 for &(g, weight) in &mixture {
@@ -41,6 +44,7 @@ pub(super) fn anchors(signals: MatRef<'_, f64>, sizes: &[usize]) -> Vec<Anchors>
                         products[g.min(h) * k + g.max(h)] += share * weight * other;
                     }
                 }
+                mixtures.push(mixture.into_iter().map(|(g, w)| (g as u32, w)).collect());
             }
             let pairs = (0..k * k)
                 .filter(|at| products[*at] > 0.0)
@@ -49,6 +53,7 @@ pub(super) fn anchors(signals: MatRef<'_, f64>, sizes: &[usize]) -> Vec<Anchors>
                 pairs: pairs.collect(),
                 points,
                 sums,
+                mixtures,
             }
         })
         .collect()

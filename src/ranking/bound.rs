@@ -9,15 +9,17 @@
 //! The weights do not depend on the class, so the sums over signals are formed once per query
 //! ([`Anchors`]); a class costs one Lasso per anchor and one product per pair of neighbours. The residual is
 //! piecewise linear in the signal, so the bound is nearly tight where anchors lie closer than its kinks.
+//!
+//! The trimmed objective is bounded by the trimmed mean of the signals' bounds, since it grows with each of them. That
+//! takes a product for each anchor of each signal, too.
 
 use super::RankingError;
 use super::anchors::Anchors;
-use super::score::{PreparedView, combine};
-use crate::cancel::Cancel;
+use super::score::{PreparedView, combine, trimmed_mean};
+use super::search::{Candidate, Search};
 use crate::coding::{Codes, CodingError, Dictionary, Signals, encode_signals};
-use crate::parameters::{Channel, Hypothesis};
-use std::collections::BTreeMap;
-use std::sync::Arc;
+use crate::parameters::{Channel, Hypothesis, RankBy};
+use faer::Mat;
 
 /// Residuals meet ‖Dᵀθ‖∞ ≤ λ to 1e-6 λ at worst. Made shorter by that much they meet it, which takes up to 1e-6 of
 /// θᵀs off the bound; the rest is for rounding.
@@ -31,7 +33,8 @@ pub(super) struct Level<'a> {
 struct CoarseView<'a> {
     hypothesis: Hypothesis,
     channel: Channel,
-    signals: Signals<'a>,
+    signals: &'a Mat<f64>,
+    points: Signals<'a>,
     anchors: &'a Anchors,
 }
 
@@ -39,12 +42,14 @@ struct CoarseView<'a> {
 #[derive(Default)]
 pub(super) struct BoundMemory {
     residuals: Vec<f64>,
+    products: Vec<f64>,
+    bounds: Vec<f64>,
 }
 
 impl<'a> Level<'a> {
     /// Makes the anchors of number `level` ready for coding.
     pub fn new(
-        views: &[PreparedView<'_>],
+        views: &'a [PreparedView<'_>],
         anchors: &'a [Vec<Anchors>],
         level: usize,
     ) -> Result<Self, CodingError> {
@@ -55,7 +60,8 @@ impl<'a> Level<'a> {
                 Ok(CoarseView {
                     hypothesis: view.hypothesis(),
                     channel: view.channel(),
-                    signals: Signals::new(anchors[level].points.as_ref())?,
+                    signals: view.matrix(),
+                    points: Signals::new(anchors[level].points.as_ref())?,
                     anchors: &anchors[level],
                 })
             })
@@ -63,26 +69,30 @@ impl<'a> Level<'a> {
         Ok(Self { views })
     }
 
-    /// A number no larger than the class's score by mean objective.
+    /// A number no larger than the candidate's score by what the search ranks by, the mean or the trimmed objective.
     pub fn bound(
         &self,
-        class: &str,
-        dictionaries: &BTreeMap<Channel, Arc<Dictionary>>,
-        lambda: f64,
+        search: &Search<'_>,
+        candidate: Candidate<'_>,
         memory: &mut BoundMemory,
-        cancel: &Cancel,
     ) -> Result<f64, RankingError> {
         let (mut plain, mut whitened, mut doubled) = (f64::NEG_INFINITY, None, Vec::new());
         for view in &self.views {
-            let dictionary = dictionaries
-                .get(&view.channel)
-                .ok_or_else(|| RankingError::MissingChannel {
-                    class: class.to_owned(),
-                    channel: view.channel,
-                })?;
-            let codes = encode_signals(dictionary, &view.signals, lambda, cancel)?;
+            let dictionary =
+                candidate
+                    .dictionaries
+                    .get(&view.channel)
+                    .ok_or_else(|| RankingError::MissingChannel {
+                        class: candidate.label.to_owned(),
+                        channel: view.channel,
+                    })?;
+            let codes = encode_signals(dictionary, &view.points, search.lambda, search.cancel)?;
             residuals(dictionary, &view.anchors.points, &codes, &mut memory.residuals);
-            let bound = dual_value(view.anchors, &memory.residuals);
+            let bound = if search.rank_by == RankBy::TrimmedObjective {
+                trimmed_dual_value(view, memory)
+            } else {
+                dual_value(view.anchors, &memory.residuals)
+            };
             match view.hypothesis {
                 Hypothesis::Plain => plain = bound,
                 Hypothesis::Whitened => whitened = Some(bound),
@@ -94,7 +104,7 @@ impl<'a> Level<'a> {
 }
 
 /// θ_g = c_g − D a_g, one after the other.
-fn residuals(dictionary: &Dictionary, points: &faer::Mat<f64>, codes: &Codes, residuals: &mut Vec<f64>) {
+fn residuals(dictionary: &Dictionary, points: &Mat<f64>, codes: &Codes, residuals: &mut Vec<f64>) {
     residuals.clear();
     for g in 0..points.ncols() {
         let first = residuals.len();
@@ -121,6 +131,37 @@ fn dual_value(anchors: &Anchors, residuals: &[f64]) -> f64 {
         .map(|(g, h, weight)| weight * dot(residual(*g), residual(*h)))
         .sum();
     linear - 0.5 * square - SLACK * (linear.abs() + square.abs())
+}
+
+/// The trimmed mean of θ_iᵀs_i − ½‖θ_i‖² with θ_i = Σ_g w_ig θ_g, each less what rounding may have added.
+fn trimmed_dual_value(view: &CoarseView<'_>, memory: &mut BoundMemory) -> f64 {
+    let (m, k) = (view.anchors.points.nrows(), view.anchors.points.ncols());
+    let BoundMemory {
+        residuals,
+        products,
+        bounds,
+    } = memory;
+    let residual = |g: u32| &residuals[g as usize * m..][..m];
+    products.clear();
+    products.resize(k * k, 0.0);
+    for &(g, h, _) in &view.anchors.pairs {
+        products[g as usize * k + h as usize] = dot(residual(g), residual(h));
+    }
+    bounds.clear();
+    bounds.extend(view.anchors.mixtures.iter().enumerate().map(|(i, mixture)| {
+        let signal = view.signals.col_as_slice(i);
+        let linear: f64 = mixture
+            .iter()
+            .map(|&(g, weight)| weight * dot(residual(g), signal))
+            .sum();
+        let square: f64 = mixture
+            .iter()
+            .flat_map(|&(g, weight)| mixture.iter().map(move |&(h, other)| (g, h, weight * other)))
+            .map(|(g, h, weight)| weight * products[g.min(h) as usize * k + g.max(h) as usize])
+            .sum();
+        linear - 0.5 * square - SLACK * (linear.abs() + square.abs())
+    }));
+    trimmed_mean(bounds)
 }
 
 fn dot(x: &[f64], y: &[f64]) -> f64 {

@@ -1,6 +1,6 @@
 //! Class scores → ranking.
 
-use super::score::{Score, prepare_views};
+use super::score::{Score, measure, prepare_views};
 use super::search::{Candidate, Search};
 use super::{Index, RankingError, View};
 use crate::cancel::Cancel;
@@ -112,7 +112,7 @@ fn ranking(
     let search = Search {
         views: &prepared,
         lambda: index.parameters.lambda,
-        rank_by,
+        rank_by: measure(&prepared, rank_by),
         cancel,
     };
     // One more than asked for, because the last one's margin is against it.

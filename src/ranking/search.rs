@@ -21,6 +21,7 @@ const WORTHWHILE: usize = 4;
 const BATCH: usize = 16;
 
 /// Something with dictionaries to be ranked by: a class or a shape.
+#[derive(Clone, Copy)]
 pub(super) struct Candidate<'a> {
     pub label: &'a str,
     pub dictionaries: &'a BTreeMap<Channel, Arc<Dictionary>>,
@@ -42,7 +43,7 @@ impl Search<'_> {
     /// those that coding all would put first.
     ///
     /// A candidate is left out when a lower bound of its score ([`Level::bound`]) exceeds the score of `wanted` others.
-    /// Only the mean objective has such a bound; ranked by anything else, all are coded.
+    /// Eq. 5 has no such bound; ranked by it, all are coded.
     pub fn best(
         &self,
         candidates: &[Candidate<'_>],
@@ -51,7 +52,7 @@ impl Search<'_> {
         let signals = self.views.iter().map(|v| v.matrix().ncols()).min().unwrap_or(0);
         let mut found = match wanted {
             Some(wanted)
-                if self.rank_by == RankBy::Objective
+                if self.rank_by != RankBy::Frobenius
                     && candidates.len() / WORTHWHILE > wanted
                     && signals >= SIZES[0] * SIGNALS_PER_ANCHOR =>
             {
@@ -74,7 +75,7 @@ impl Search<'_> {
         let anchors: Vec<_> = self
             .views
             .par_iter()
-            .map(|view| anchors(view.matrix(), &sizes))
+            .map(|view| anchors(view.matrix().as_ref(), &sizes))
             .collect();
         let coarse = Level::new(self.views, &anchors, 0)?;
         let fine = Level::new(self.views, &anchors, 1)?;
@@ -126,8 +127,7 @@ impl Search<'_> {
         let mut bounds = numbers
             .into_par_iter()
             .map_init(BoundMemory::default, |memory, i| {
-                let Candidate { label, dictionaries } = candidates[i];
-                let bound = level.bound(label, dictionaries, self.lambda, memory, self.cancel)?;
+                let bound = level.bound(self, candidates[i], memory)?;
                 Ok((bound, i))
             })
             .collect::<Result<Vec<Bounded>, RankingError>>()?;

@@ -12,6 +12,9 @@ pub struct View {
     pub channel: Channel,
     /// Full area over visible area that was assumed; 1 unless doubled.
     pub area_scale: f64,
+    /// Whether the surface has a boundary. Something is missing then, and what is near to that looks different on the
+    /// whole.
+    pub bounded: bool,
     /// The signals, M × N.
     pub signatures: Signatures,
 }

@@ -6,6 +6,7 @@
 use super::payload::{from_json, only, pack, to_json, unpack};
 use super::record::{Family, Record, seal, unseal};
 use super::{Store, StoreError, files};
+use crate::mesh::PrepareReport;
 use crate::model::ContentHash;
 use crate::parameters::{Channel, Hypothesis};
 use crate::pipeline::Description;
@@ -78,6 +79,7 @@ impl Record for Description {
     fn decode(version: u16, payload: &[u8]) -> Result<Self, String> {
         only(version, 1)?;
         let v: DescriptionV1 = unpack(payload)?;
+        let report: PrepareReport = from_json(&v.report)?;
         let views = v
             .views
             .into_iter()
@@ -91,6 +93,7 @@ impl Record for Description {
                     hypothesis: *HYPOTHESES.get(usize::from(view.hypothesis)).ok_or_else(unknown)?,
                     channel: *CHANNELS.get(usize::from(view.channel)).ok_or_else(unknown)?,
                     area_scale: view.area_scale,
+                    bounded: report.openness > 0.0,
                     signatures: Signatures {
                         matrix: Mat::from_fn(rows, columns, |i, j| view.values[j * rows + i]),
                         vertices: view.vertices,
@@ -100,7 +103,7 @@ impl Record for Description {
             .collect::<Result<_, String>>()?;
         Ok(Self {
             views,
-            report: from_json(&v.report)?,
+            report,
             eigenvalues: v.eigenvalues,
         })
     }
