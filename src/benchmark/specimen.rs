@@ -5,7 +5,7 @@
 use crate::cancel::Cancel;
 use crate::mesh::{PrepareOptions, TriangleSoup, prepare};
 use crate::parameters::{Channel, Hypothesis, Parameters};
-use crate::pipeline::prepared::refined_to;
+use crate::pipeline::prepared::{refined_to, taken_as_part};
 use crate::pipeline::{Description, PipelineError, PreparedShape};
 use crate::ranking::View;
 use crate::signature::normalise::normalise;
@@ -66,6 +66,7 @@ pub struct Specimen {
 struct Solved {
     options: PrepareOptions,
     refined_to: usize,
+    part: bool,
     eigenpairs: usize,
     whitened: bool,
     shape: PreparedShape,
@@ -202,10 +203,12 @@ fn solve(
     // Preparing is deterministic and reports all it does: equal reports of one soup are equal meshes.
     let (_, report) = prepare(soup.clone(), &options)?;
     let refined_to = refined_to(&report, parameters);
+    let part = taken_as_part(&report, parameters);
     let whitened = parameters.hypotheses.contains(&Hypothesis::Whitened);
     let equal = |s: &Solved| {
         s.eigenpairs == parameters.eigenpairs
             && s.refined_to == refined_to
+            && s.part == part
             && (s.whitened || !whitened)
             && s.options.components == options.components
             && *s.shape.report() == report
@@ -218,6 +221,7 @@ fn solve(
     solved.push(Solved {
         options,
         refined_to,
+        part,
         eigenpairs: parameters.eigenpairs,
         whitened,
         shape,

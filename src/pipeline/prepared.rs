@@ -2,7 +2,7 @@
 
 use super::{Description, PipelineError, Stage};
 use crate::cancel::Cancel;
-use crate::mesh::boundary::boundary_vertices;
+use crate::mesh::boundary::{boundary_vertices, smooth_boundary};
 use crate::mesh::refine::refine;
 use crate::mesh::whiten::whiten;
 use crate::mesh::{PrepareReport, TriMesh, TriangleSoup, prepare_until};
@@ -34,7 +34,7 @@ pub fn refined_to(report: &PrepareReport, parameters: &Parameters) -> usize {
 ///
 /// Then all of its views are coded under the dictionaries of the fixed grid, so that the errors of the doubled surface
 /// compare with those of the surface as it is; and it is not whitened, as a part's moments are not the whole's.
-pub(super) fn taken_as_part(report: &PrepareReport, parameters: &Parameters) -> bool {
+pub fn taken_as_part(report: &PrepareReport, parameters: &Parameters) -> bool {
     report.openness > OPEN_ABOVE && parameters.hypotheses.contains(&Hypothesis::Doubled)
 }
 
@@ -86,7 +86,12 @@ impl PreparedShape {
     ) -> Result<Self, PipelineError> {
         observer(Stage::Prepare);
         let (mesh, report) = prepare_until(soup, &parameters.prepare_options(), cancel)?;
-        let mesh = refine(mesh, refined_to(&report, parameters))?;
+        let part = taken_as_part(&report, parameters);
+        let mesh = if part {
+            smooth_boundary(mesh)?
+        } else {
+            refine(mesh, refined_to(&report, parameters))?
+        };
         cancel.check()?;
         observer(Stage::Laplacian);
         let operators = assemble(&mesh)?;
@@ -94,8 +99,7 @@ impl PreparedShape {
         let solve = |operators: &Operators| {
             smallest_eigenpairs(operators, parameters.eigenpairs, &EigenOptions::default(), cancel)
         };
-        let whitened = parameters.hypotheses.contains(&Hypothesis::Whitened)
-            && (parts_whitened || !taken_as_part(&report, parameters));
+        let whitened = parameters.hypotheses.contains(&Hypothesis::Whitened) && (parts_whitened || !part);
         let (eigenpairs, whitened) = if whitened {
             let (plain, whitened) = rayon::join(
                 || solve(&operators),
