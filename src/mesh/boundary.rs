@@ -17,10 +17,22 @@ pub fn boundary_vertices(mesh: &TriMesh) -> Vec<bool> {
     on_boundary
 }
 
-/// Boundary length / √area: 0 for a closed surface, 2.507 for a half sphere, 8–16 for a single view of a shape.
+/// Length of the boundary's loops / √area: 0 for a closed surface, 2.507 for a half sphere, 8–16 for a single view of a
+/// shape.
+///
+/// An edge of one face that is in no loop, as fins at non-manifold edges have them, bounds no part that is missing.
 pub fn openness(mesh: &TriMesh) -> f64 {
     let boundary = edge_census(mesh.vertices().len(), mesh.faces()).boundary;
-    boundary_length(mesh.vertices(), &boundary) / mesh.area().sqrt()
+    loops_length(mesh.vertices(), &boundary) / mesh.area().sqrt()
+}
+
+/// Summed length of the loops that boundary edges form.
+pub(super) fn loops_length(vertices: &[[f64; 3]], boundary: &[[u32; 2]]) -> f64 {
+    let loops = boundary_loops(vertices, boundary);
+    // Folded from +0, as an empty float sum is −0.
+    loops
+        .iter()
+        .fold(0.0, |length, edges| length + boundary_length(vertices, edges))
 }
 
 /// The mesh with a smoother boundary: each vertex on it moves half-way to the mean of its neighbours along it. Faces,
@@ -53,6 +65,78 @@ pub fn smooth_boundary(mesh: TriMesh) -> Result<TriMesh, MeshError> {
         }
     }
     TriMesh::new(vertices, faces, signature_vertices)
+}
+
+/// Splits boundary edges into simple loops, each a list of the edges as given (their direction may vary).
+///
+/// At an ordinary boundary two edges meet in a vertex and there is nothing to choose. Where more meet (holes that
+/// touch in a vertex, non-manifold spots) the walk takes the shortest edge first, and whenever it comes back to a
+/// vertex it has passed, the part since then is a loop of its own. A walk that ends nowhere is dropped. Choices go by
+/// place, never by index, so the order of vertices does not matter.
+pub(super) fn boundary_loops(vertices: &[[f64; 3]], boundary: &[[u32; 2]]) -> Vec<Vec<[u32; 2]>> {
+    // Compact numbers of the vertices on the boundary, ordered by place.
+    let mut on: Vec<u32> = boundary.iter().flatten().copied().collect();
+    on.sort_unstable();
+    on.dedup();
+    let by_index = on.clone();
+    let place = |v: u32| vertices[v as usize];
+    on.sort_by(|&a, &b| {
+        place(a)
+            .partial_cmp(&place(b))
+            .unwrap_or(std::cmp::Ordering::Equal)
+            .then(a.cmp(&b))
+    });
+    let mut rank = vec![0usize; on.len()];
+    for (r, v) in on.iter().enumerate() {
+        rank[by_index.partition_point(|w| w < v)] = r;
+    }
+    let rank_of = |v: u32| rank[by_index.partition_point(|w| *w < v)];
+
+    // For each vertex its edges, shortest last, as a walk pops from the end.
+    let mut edges_at: Vec<Vec<(f64, usize, usize)>> = vec![Vec::new(); on.len()]; // length, other end, edge
+    for (e, &[a, b]) in boundary.iter().enumerate() {
+        let (ra, rb) = (rank_of(a), rank_of(b));
+        let length = distance(&place(a), &place(b));
+        edges_at[ra].push((length, rb, e));
+        edges_at[rb].push((length, ra, e));
+    }
+    for list in &mut edges_at {
+        list.sort_by(|x, y| y.0.total_cmp(&x.0).then(y.1.cmp(&x.1)));
+    }
+
+    let mut used = vec![false; boundary.len()];
+    let mut position = vec![usize::MAX; on.len()]; // where a vertex stands on the current path
+    let mut loops = Vec::new();
+    for start in 0..on.len() {
+        let mut path: Vec<usize> = vec![start]; // vertices
+        let mut trail: Vec<usize> = Vec::new(); // edges between them
+        position[start] = 0;
+        while let Some(&at) = path.last() {
+            let Some((_, to, e)) = edges_at[at].pop() else {
+                // A dead end: step back and leave the edge out.
+                position[at] = usize::MAX;
+                path.pop();
+                trail.pop();
+                continue;
+            };
+            if used[e] {
+                continue;
+            }
+            used[e] = true;
+            trail.push(e);
+            if position[to] == usize::MAX {
+                position[to] = path.len();
+                path.push(to);
+            } else {
+                let since = position[to];
+                loops.push(trail.drain(since..).map(|e| boundary[e]).collect());
+                for v in path.drain(since + 1..) {
+                    position[v] = usize::MAX;
+                }
+            }
+        }
+    }
+    loops
 }
 
 /// Summed length of edges.

@@ -1,6 +1,6 @@
 //! Soup → clean mesh of the working size, with a report of what was done.
 
-use super::boundary::boundary_length;
+use super::boundary::loops_length;
 use super::clean::{Cleaned, clean};
 use super::decimate::{Simplified, simplify_to};
 use super::edges::edge_census;
@@ -88,7 +88,8 @@ pub struct PrepareReport {
     pub faces: usize,
     /// Surface area of the prepared mesh before normalisation, in the file's squared units.
     pub area: f64,
-    /// Boundary length / √area after small holes were closed: 0 for a closed surface, 8–16 for a single view.
+    /// Length of the boundary's loops / √area after small holes were closed: 0 for a closed surface, 8–16 for a single
+    /// view.
     pub openness: f64,
     /// Things a user should know, one sentence each.
     pub warnings: Vec<String>,
@@ -156,7 +157,7 @@ pub fn prepare_until(
     let mesh = TriMesh::new(vertices, faces, report.vertices)?;
     let area = mesh.area();
     report.boundary_edges = census.boundary.len();
-    report.openness = boundary_length(mesh.vertices(), &census.boundary) / area.sqrt();
+    report.openness = loops_length(mesh.vertices(), &census.boundary) / area.sqrt();
     // Clamped, as the squared units of a finite file may overflow and reports are written as JSON.
     report.area = (area * scale * scale).min(f64::MAX);
     report.warnings = warnings(&report, simplified);

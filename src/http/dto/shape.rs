@@ -57,7 +57,7 @@ pub struct ReportDto {
     pub faces: usize,
     /// Surface area in the file's squared units.
     pub area: f64,
-    /// Boundary length over the root of the area: 0 for a closed surface, 8 to 16 for a single view.
+    /// Length of the boundary's loops over the root of the area: 0 for a closed surface, 8 to 16 for a single view.
     pub openness: f64,
     /// Things you should know, one sentence each.
     pub warnings: Vec<String>,
