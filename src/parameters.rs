@@ -34,7 +34,7 @@ pub enum Preset {
     Paper,
     /// `default` with the affine-whitened hypothesis (method, step 10), for stretched shapes.
     Robust,
-    /// `default` with less of everything, for answers within some 20 ms: 1000 vertices, n 130, L 64, 600
+    /// `default` with less of most, for answers within some 20 ms: 1000 vertices, n 130, 600
     /// signatures of a training shape and 200 of a query.
     Fast,
 }
@@ -184,7 +184,6 @@ impl Parameters {
                 working_size: 1000,
                 refine_below: 650,
                 eigenpairs: 130,
-                atoms: 64,
                 samples_per_shape: 600,
                 query_samples: 200,
                 ..default
