@@ -2,7 +2,7 @@
 
 use super::shape_dna::EIGENVALUES;
 use super::{SignatureDistances, Vocabulary, distance, shape_dna};
-use crate::parameters::{Channel, Parameters};
+use crate::parameters::Channel;
 use crate::pipeline::Description;
 use crate::signature::Signatures;
 use faer::Mat;
@@ -78,15 +78,6 @@ pub struct Nearest {
     pub distance: f64,
 }
 
-/// The parameters shapes are described with for a baseline, training shapes and queries alike: the plain hypothesis
-/// only, so that no spectrum is solved for that no baseline looks at.
-pub fn baseline_parameters(parameters: &Parameters) -> Parameters {
-    Parameters {
-        hypotheses: vec![crate::parameters::Hypothesis::Plain],
-        ..parameters.clone()
-    }
-}
-
 /// The signatures of the plain view; `None` where there are none.
 fn plain(description: &Description) -> Option<&Signatures> {
     let view = description.views.iter().find(|v| v.channel == Channel::Plain)?;
@@ -153,7 +144,7 @@ impl BaselineShape {
 
 impl BaselineIndex {
     /// All training shapes of the classes that are kept, nearest first; ties are broken by label. The query must be
-    /// described as a training shape is, with [`baseline_parameters`]: histograms of differently sampled signatures do
+    /// described as a training shape is, by [`describe_plain`](crate::pipeline::describe_plain): histograms of differently sampled signatures do
     /// not compare. `None` where it has no signatures of the words' length.
     pub fn nearest(
         &self,

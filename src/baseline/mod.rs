@@ -8,8 +8,7 @@ pub mod signature_distances;
 
 pub use bag_of_words::Vocabulary;
 pub use index::{
-    Baseline, BaselineClass, BaselineIndex, BaselineModel, BaselineShape, Nearest, baseline_parameters,
-    nearest_classes, thinned,
+    Baseline, BaselineClass, BaselineIndex, BaselineModel, BaselineShape, Nearest, nearest_classes, thinned,
 };
 pub use shape_dna::shape_dna;
 pub use signature_distances::{SignatureDistances, sample_distances};

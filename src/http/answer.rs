@@ -10,13 +10,12 @@ use super::ranked::Ranked;
 use super::state::Parts;
 use super::time_limit::{TimeView, rank_until};
 use super::uploaded::UploadedMesh;
-use crate::baseline::baseline_parameters;
 use crate::jobs::LiveIndex;
 use crate::mesh::TriangleSoup;
 use crate::model::ClassId;
 use crate::parameters::Parameters;
 use crate::pipeline::prepared::OPEN_ABOVE;
-use crate::pipeline::{Stage, StageSpan, describe_query, describe_shape, rank, rank_top};
+use crate::pipeline::{Stage, StageSpan, describe_plain, describe_query, rank, rank_top};
 use crate::ranking::{Index, SIGNIFICANCE};
 use crate::spectral;
 use crate::store::StoreError;
@@ -84,9 +83,8 @@ pub fn answer(
                 .baselines
                 .as_ref()
                 .ok_or_else(|| baselines_missing(named.name()))?;
-            let parameters = baseline_parameters(parameters);
             let description =
-                describe_shape(soup, &parameters, stop, &observer).map_err(|e| timely(e.into()))?;
+                describe_plain(soup, parameters, stop, &observer).map_err(|e| timely(e.into()))?;
             observer(Stage::Ranking);
             let present = |label: &str| names.contains_key(label);
             let nearest = baselines

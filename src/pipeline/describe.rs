@@ -3,7 +3,7 @@
 use super::{PipelineError, PreparedShape, Stage};
 use crate::cancel::Cancel;
 use crate::mesh::{PrepareReport, TriangleSoup};
-use crate::parameters::Parameters;
+use crate::parameters::{Hypothesis, Parameters};
 use crate::ranking::View;
 
 /// Everything a shape's coding needs.
@@ -47,6 +47,24 @@ pub fn describe_query(
 ) -> Result<Description, PipelineError> {
     let mut shape = PreparedShape::query(soup, parameters, cancel, observer)?;
     let views = shape.query_views(parameters, cancel)?;
+    Ok(shape.into_description(views))
+}
+
+/// Describes a query for the baselines, which compare it with the plain view of training shapes: by that view alone, with
+/// `samples_per_shape` signatures, and without the spectra that the others need.
+///
+/// # Errors
+/// The error of the stage that failed, or [`PipelineError::Cancelled`].
+pub fn describe_plain(
+    soup: TriangleSoup,
+    parameters: &Parameters,
+    cancel: &Cancel,
+    observer: &dyn Fn(Stage),
+) -> Result<Description, PipelineError> {
+    let mut parameters = parameters.clone();
+    parameters.hypotheses.retain(|h| *h != Hypothesis::Whitened);
+    let shape = PreparedShape::new(soup, &parameters, cancel, observer)?;
+    let views = vec![shape.training_plain(&parameters)?];
     Ok(shape.into_description(views))
 }
 

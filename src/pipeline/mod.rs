@@ -11,7 +11,7 @@ pub mod stage;
 mod views;
 
 pub use crate::ranking::{rank, rank_top};
-pub use describe::{Description, describe_both, describe_query, describe_shape};
+pub use describe::{Description, describe_both, describe_plain, describe_query, describe_shape};
 pub use error::PipelineError;
 pub use held_out::held_out_scores;
 pub use learn::{Model, ModelReport, learn_model};

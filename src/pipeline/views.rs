@@ -114,6 +114,15 @@ impl PreparedShape {
         Ok(views)
     }
 
+    /// The plain view of a training shape, which is the first of [`training_views`](Self::training_views).
+    ///
+    /// # Errors
+    /// [`PipelineError::Spectral`] where the spectrum is too short.
+    pub fn training_plain(&self, parameters: &Parameters) -> Result<View, PipelineError> {
+        let vertices = self.sample(parameters.samples_per_shape, parameters.seed);
+        self.plain(&vertices, parameters)
+    }
+
     fn plain(&self, vertices: &[u32], parameters: &Parameters) -> Result<View, PipelineError> {
         self.view(
             &self.eigenpairs,

@@ -7,7 +7,7 @@ use shapelex::cancel::Cancel;
 use shapelex::mesh::trimesh::face_area;
 use shapelex::mesh::{Components, PrepareOptions, PrepareReport, TriangleSoup, prepare};
 use shapelex::parameters::{Channel, Hypothesis, Parameters, Preset};
-use shapelex::pipeline::{PreparedShape, describe_both, describe_query};
+use shapelex::pipeline::{PreparedShape, describe_both, describe_plain, describe_query};
 use shapelex::sample::{Species, ZooOptions};
 use std::collections::BTreeSet;
 
@@ -227,6 +227,13 @@ fn the_robust_preset_undoes_affine_maps_of_a_known_mesh_and_sees_views() {
     // A view is open, so it is described as it is and under the areas assumed, all on the fixed grid.
     let view = Deformation::View.apply(&creature(4, 0), 1, 5);
     let (training, query) = describe_both(view.clone(), &robust, &Cancel::new()).unwrap();
+    // What the baselines compare a query by is what they kept of the same shape as one that trains.
+    let plain = describe_plain(view.clone(), &robust, &Cancel::new(), &|_| ()).unwrap();
+    assert_eq!(plain.eigenvalues, training.eigenvalues);
+    assert_eq!(
+        plain.views[0].signatures.matrix,
+        training.views[0].signatures.matrix
+    );
     let alone = describe_query(view, &robust, &Cancel::new(), &|_| ()).unwrap();
     for views in [&query.views, &alone.views] {
         let seen: Vec<_> = views.iter().map(|v| (v.hypothesis, v.channel)).collect();
