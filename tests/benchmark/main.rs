@@ -275,24 +275,25 @@ fn parts_that_train_tell_what_the_whole_is() {
         atoms: 64,
         ..Parameters::preset(Preset::Default)
     };
-    let mut shapes = Vec::new();
-    for species in [0, 4, 7] {
+    // Poses 0, 2 and 4 train, views all; the whole and a view from another side are asked about.
+    let describe = |species: usize, pose: u32| {
         let whole = creature(species, 0);
-        // Poses 0, 2 and 4 train, views all; the whole and a view from another side are asked about.
-        for pose in 0..5 {
-            let soup = match pose {
-                1 => whole.clone(),
-                _ => Deformation::View.apply(&whole, pose.max(1), 31),
-            };
-            let (training, query) = describe_both(soup, &parameters, &Cancel::new()).unwrap();
-            shapes.push(LabelledShape {
-                class: species.to_string(),
-                name: format!("pose{pose}"),
-                training,
-                query,
-            });
+        let soup = match pose {
+            1 => whole,
+            _ => Deformation::View.apply(&whole, pose.max(1), 31),
+        };
+        let (training, query) = describe_both(soup, &parameters, &Cancel::new()).unwrap();
+        LabelledShape {
+            class: species.to_string(),
+            name: format!("pose{pose}"),
+            training,
+            query,
         }
-    }
+    };
+    let shapes: Vec<_> = (0..12)
+        .flat_map(|species| (0..5).map(move |pose| (species, pose)))
+        .map(|(species, pose)| describe(species, pose))
+        .collect();
     let answer = evaluate(
         &shapes,
         Protocol::EvenOdd,
@@ -302,7 +303,15 @@ fn parts_that_train_tell_what_the_whole_is() {
         &|_, _| (),
     )
     .unwrap();
-    assert_eq!((answer.correct, answer.total), (6, 6), "{:?}", answer.queries);
+    let right = |name| {
+        let asked = answer.queries.iter().filter(|q| q.name == name);
+        asked.filter(|q| q.correct).count()
+    };
+    let (wholes, views) = (right("pose1"), right("pose3"));
+    assert!(
+        wholes >= 99 && views >= 99,
+        "{wholes} wholes and {views} views of 12"
+    );
 }
 
 #[test]
