@@ -308,10 +308,8 @@ fn parts_that_train_tell_what_the_whole_is() {
         asked.filter(|q| q.correct).count()
     };
     let (wholes, views) = (right("pose1"), right("pose3"));
-    assert!(
-        wholes >= 99 && views >= 99,
-        "{wholes} wholes and {views} views of 12"
-    );
+    // 10 and 11; were the parts learnt as they are, 9 and 9.
+    assert!(wholes + views >= 20, "{wholes} wholes and {views} views of 12");
 }
 
 #[test]
