@@ -144,8 +144,8 @@ impl BaselineShape {
 
 impl BaselineIndex {
     /// All training shapes of the classes that are kept, nearest first; ties are broken by label. The query must be
-    /// described as a training shape is, by [`describe_plain`](crate::pipeline::describe_plain): histograms of differently sampled signatures do
-    /// not compare. `None` where it has no signatures of the words' length.
+    /// described as a training shape is, by [`describe_plain`](crate::pipeline::describe_plain): histograms of
+    /// differently sampled signatures do not compare. `None` where it has no signatures of the words' length.
     pub fn nearest(
         &self,
         query: &Description,

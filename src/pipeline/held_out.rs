@@ -10,8 +10,8 @@ use crate::ranking::{View, prepare_views, score};
 const FOLDS: usize = 10;
 
 /// Scores of a class's training shapes, each under dictionaries learnt from the other folds' shapes; in no particular
-/// order, but for open ones, which say nothing of whole shapes and are not judged. Empty for a single shape, and with a ranking by Eq. 5, whose error grows with the number of vertices, so that
-/// one shape's says nothing of another's.
+/// order, but for open ones, which say nothing of whole shapes and are not judged. Empty for a single shape, and with a
+/// ranking by Eq. 5, whose error grows with the number of vertices, so that one shape's says nothing of another's.
 ///
 /// # Errors
 /// As [`learn_model`] and [`score`].

@@ -13,10 +13,12 @@ use crate::spectral::{
     EigenOptions, Eigenpairs, Operators, assemble, doubled_eigenpairs, smallest_eigenpairs,
 };
 
-/// A query with a boundary longer than this many √area is open: a single view has 8 to 16, a half sphere 2.507.
+/// A surface whose boundary loops are longer than this many √area is open: a single view has 8 to 16, a half sphere
+/// 2.507.
 pub const OPEN_ABOVE: f64 = 2.5;
 /// How many eigenvalues a description reports.
 const REPORTED_EIGENVALUES: usize = 20;
+
 /// How many vertices a prepared mesh is refined to before its spectrum is solved for; 0 where it stays as it is.
 ///
 /// An open mesh does: it is likely a part of a shape, and a part sampled as densely as the whole has the whole's

@@ -174,12 +174,14 @@ impl PreparedShape {
         vertices: impl Fn(usize) -> Vec<u32>,
         parameters: &Parameters,
     ) -> Result<Vec<View>, PipelineError> {
+        let mut scaled = doubled.clone();
         AREA_SCALES
             .iter()
             .enumerate()
             .map(|(i, &scale)| {
-                let mut scaled = doubled.clone();
-                scaled.values.iter_mut().for_each(|v| *v *= scale / 2.0);
+                for (value, unscaled) in scaled.values.iter_mut().zip(&doubled.values) {
+                    *value = unscaled * (scale / 2.0);
+                }
                 self.view(
                     &scaled,
                     &vertices(i),

@@ -53,12 +53,13 @@ impl SledBackend {
             done => return done,
         };
         let _space = self.failure.hold_space();
-        self.failure.remember(full);
         // Another read may have opened it meanwhile.
         match self.with(what, &work) {
             Err(StoreError::Full { .. }) => {}
             done => return done,
         }
+        // Before it is opened anew, so that no write that is under way takes itself for done.
+        self.failure.remember(full);
         self.reopen(&mut || Ok(()))?;
         self.with(what, work)
     }
