@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// Goes into the fingerprints, and changes where the same parameters come to describe training shapes differently, so
 /// that what was kept is made anew: 2 since parts are doubled.
-const DESCRIBED: &str = "2";
+const DESCRIBED: &str = "3";
 
 /// A parameter is outside its range.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -97,6 +97,9 @@ pub struct Parameters {
     pub refine_below: usize,
     /// n, the number of eigenpairs.
     pub eigenpairs: usize,
+    /// Eigenpairs on the fixed grid, where open queries are compared with training shapes; no fewer than n are solved
+    /// for. Parts agree with the whole in what is small, which takes more of them to see.
+    pub part_eigenpairs: usize,
     /// The local descriptor.
     pub descriptor: Descriptor,
     /// M, the length of a signature: energies of the WKS, times of the HKS, frequencies of the SI-HKS.
@@ -145,6 +148,7 @@ impl Parameters {
             working_size: 2000,
             refine_below: 1000,
             eigenpairs: 200,
+            part_eigenpairs: 300,
             descriptor: Descriptor::Wks,
             energies: 60,
             sigma_steps: 6.0,
@@ -177,6 +181,7 @@ impl Parameters {
                 ..default
             },
             Preset::Robust => Self {
+                part_eigenpairs: 500,
                 hypotheses: vec![Hypothesis::Plain, Hypothesis::Whitened, Hypothesis::Doubled],
                 ..default
             },
@@ -184,6 +189,7 @@ impl Parameters {
                 working_size: 1000,
                 refine_below: 650,
                 eigenpairs: 130,
+                part_eigenpairs: 130,
                 samples_per_shape: 600,
                 query_samples: 200,
                 ..default
@@ -213,6 +219,7 @@ impl Parameters {
             )
         };
         within("eigenpairs", self.eigenpairs, 3, 1000)?;
+        within("part_eigenpairs", self.part_eigenpairs, 3, 1000)?;
         within("energies", self.energies, 2, 2000)?;
         within("atoms", self.atoms, 1, 5000)?;
         within("iterations", self.iterations, 1, 10_000)?;

@@ -68,6 +68,7 @@ struct Solved {
     refined_to: usize,
     part: bool,
     eigenpairs: usize,
+    on_fixed_grid: usize,
     whitened: bool,
     shape: PreparedShape,
 }
@@ -205,8 +206,14 @@ fn solve(
     let refined_to = refined_to(&report, parameters);
     let part = taken_as_part(&report, parameters);
     let whitened = parameters.hypotheses.contains(&Hypothesis::Whitened);
+    let on_fixed_grid = if parameters.hypotheses.contains(&Hypothesis::Doubled) {
+        parameters.part_eigenpairs
+    } else {
+        0
+    };
     let equal = |s: &Solved| {
         s.eigenpairs == parameters.eigenpairs
+            && s.on_fixed_grid >= on_fixed_grid
             && s.refined_to == refined_to
             && s.part == part
             && (s.whitened || !whitened)
@@ -217,12 +224,16 @@ fn solve(
         return Ok(at);
     }
     let shape = PreparedShape::new(soup.clone(), parameters, cancel, &|_| ())?;
-    spectra.push(Spectrum::of(shape.eigenpairs(), shape.signature_vertices()));
+    spectra.push(Spectrum::of(
+        &shape.eigenpairs().first(parameters.eigenpairs),
+        shape.signature_vertices(),
+    ));
     solved.push(Solved {
         options,
         refined_to,
         part,
         eigenpairs: parameters.eigenpairs,
+        on_fixed_grid,
         whitened,
         shape,
     });

@@ -82,7 +82,7 @@ impl PreparedShape {
     fn solve(
         soup: TriangleSoup,
         parameters: &Parameters,
-        parts_whitened: bool,
+        training: bool,
         cancel: &Cancel,
         observer: &dyn Fn(Stage),
     ) -> Result<Self, PipelineError> {
@@ -98,18 +98,26 @@ impl PreparedShape {
         observer(Stage::Laplacian);
         let operators = assemble(&mesh)?;
         observer(Stage::Eigenpairs);
-        let solve = |operators: &Operators| {
-            smallest_eigenpairs(operators, parameters.eigenpairs, &EigenOptions::default(), cancel)
+        let solve = |operators: &Operators, n: usize| {
+            smallest_eigenpairs(operators, n, &EigenOptions::default(), cancel)
         };
-        let whitened = parameters.hypotheses.contains(&Hypothesis::Whitened) && (parts_whitened || !part);
+        let on_fixed_grid = part || (training && parameters.hypotheses.contains(&Hypothesis::Doubled));
+        let n = if on_fixed_grid {
+            parameters.eigenpairs.max(parameters.part_eigenpairs)
+        } else {
+            parameters.eigenpairs
+        };
+        let whitened = parameters.hypotheses.contains(&Hypothesis::Whitened) && (training || !part);
         let (eigenpairs, whitened) = if whitened {
             let (plain, whitened) = rayon::join(
-                || solve(&operators),
-                || -> Result<Eigenpairs, PipelineError> { Ok(solve(&assemble(&whiten(&mesh)?)?)?) },
+                || solve(&operators, n),
+                || -> Result<Eigenpairs, PipelineError> {
+                    Ok(solve(&assemble(&whiten(&mesh)?)?, parameters.eigenpairs)?)
+                },
             );
             (plain?, Some(whitened))
         } else {
-            (solve(&operators)?, None)
+            (solve(&operators, n)?, None)
         };
         observer(Stage::Signatures);
         Ok(Self {
@@ -131,7 +139,7 @@ impl PreparedShape {
         self.mesh.signature_vertices()
     }
 
-    /// The plain view's eigenpairs.
+    /// The eigenpairs of the surface: those of the plain view first, then what the fixed grid needs beyond.
     pub fn eigenpairs(&self) -> &Eigenpairs {
         &self.eigenpairs
     }
@@ -156,7 +164,7 @@ impl PreparedShape {
             &self.operators,
             &self.eigenpairs,
             &boundary,
-            parameters.eigenpairs,
+            parameters.eigenpairs.max(parameters.part_eigenpairs),
             &EigenOptions::default(),
             cancel,
         )?;

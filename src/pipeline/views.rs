@@ -12,16 +12,25 @@ use crate::spectral::Eigenpairs;
 
 /// Full area over visible area, as assumed for an open query (method, step 10).
 const AREA_SCALES: [f64; 4] = [2.0, 2.5, 3.0, 4.0];
-/// The grid that doubled surfaces and training shapes share: 100 energies from log 10 to log 3000, σ of 6 steps.
-const FIXED_GRID: DescriptorParameters = DescriptorParameters {
-    descriptor: Descriptor::Wks,
-    dimension: 100,
-    sigma_steps: 6.0,
-    range: WksRange::Fixed {
-        low: std::f64::consts::LN_10,
-        high: 8.006_367_567_650_246,
-    },
-};
+/// Energies of the fixed grid.
+const FIXED_ENERGIES: usize = 100;
+/// σ on the fixed grid, in units of log λ.
+const FIXED_SIGMA: f64 = 0.27;
+/// Highest energy of the fixed grid: the logarithm of this many times n. Weyl's law has λ_n = 4π n on a closed surface of
+/// area 1.
+const FIXED_TOP: f64 = 15.0;
+
+/// The grid that doubled surfaces and training shapes share: 100 energies from log 10 to log 15 n, σ 0.27.
+fn fixed_grid(n: usize) -> DescriptorParameters {
+    let low = std::f64::consts::LN_10;
+    let high = (FIXED_TOP * n.max(2) as f64).ln();
+    DescriptorParameters {
+        descriptor: Descriptor::Wks,
+        dimension: FIXED_ENERGIES,
+        sigma_steps: FIXED_SIGMA * (FIXED_ENERGIES - 1) as f64 / (high - low),
+        range: WksRange::Fixed { low, high },
+    }
+}
 
 impl PreparedShape {
     /// The views of a training shape: one per channel. One that is a part is doubled, as a query is; its full area is
@@ -204,11 +213,11 @@ impl PreparedShape {
         channel: Channel,
         area_scale: f64,
     ) -> Result<View, PipelineError> {
-        let descriptor = match channel {
-            Channel::FixedGrid => FIXED_GRID,
-            Channel::Plain | Channel::Whitened => parameters.descriptor_parameters(),
+        let (n, descriptor) = match channel {
+            Channel::FixedGrid => (parameters.part_eigenpairs, fixed_grid(parameters.part_eigenpairs)),
+            Channel::Plain | Channel::Whitened => (parameters.eigenpairs, parameters.descriptor_parameters()),
         };
-        let mut signatures = describe_vertices(eigenpairs, vertices, &descriptor)?;
+        let mut signatures = describe_vertices(&eigenpairs.first(n), vertices, &descriptor)?;
         normalise(&mut signatures, parameters.normalisation);
         Ok(View {
             hypothesis,

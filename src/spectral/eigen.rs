@@ -7,6 +7,7 @@ use super::{Operators, SpectralError};
 use crate::cancel::Cancel;
 use faer::Mat;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// How the eigen-solve is run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,6 +38,20 @@ pub struct Eigenpairs {
     pub vectors: Mat<f64>,
     /// Largest relative residual ‖Wφ − λAφ‖_{A⁻¹} / (λ ‖φ‖_A) over the non-zero eigenvalues, measured.
     pub residual: f64,
+}
+
+impl Eigenpairs {
+    /// The first `n` of them; all where there are no more.
+    pub fn first(&self, n: usize) -> Cow<'_, Self> {
+        if n >= self.values.len() {
+            return Cow::Borrowed(self);
+        }
+        Cow::Owned(Self {
+            values: self.values[..n].to_vec(),
+            vectors: self.vectors.subcols(0, n).to_owned(),
+            residual: self.residual,
+        })
+    }
 }
 
 /// The `n` smallest eigenpairs; fewer (V − 1) where the mesh has no more.

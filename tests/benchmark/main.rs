@@ -276,11 +276,11 @@ fn parts_that_train_tell_what_the_whole_is() {
         ..Parameters::preset(Preset::Default)
     };
     // Poses 0, 2 and 4 train, views all; the whole and a view from another side are asked about.
-    let describe = |species: usize, pose: u32| {
+    let describe = |species: usize, pose: u32, seed: u64| {
         let whole = creature(species, 0);
         let soup = match pose {
             1 => whole,
-            _ => Deformation::View.apply(&whole, pose.max(1), 31),
+            _ => Deformation::View.apply(&whole, pose.max(1), seed),
         };
         let (training, query) = describe_both(soup, &parameters, &Cancel::new()).unwrap();
         LabelledShape {
@@ -290,26 +290,30 @@ fn parts_that_train_tell_what_the_whole_is() {
             query,
         }
     };
-    let shapes: Vec<_> = (0..12)
-        .flat_map(|species| (0..5).map(move |pose| (species, pose)))
-        .map(|(species, pose)| describe(species, pose))
-        .collect();
-    let answer = evaluate(
-        &shapes,
-        Protocol::EvenOdd,
-        &parameters,
-        &[],
-        &Cancel::new(),
-        &|_, _| (),
-    )
-    .unwrap();
-    let right = |name| {
-        let asked = answer.queries.iter().filter(|q| q.name == name);
-        asked.filter(|q| q.correct).count()
-    };
-    let (wholes, views) = (right("pose1"), right("pose3"));
-    // 10 and 11; were the parts learnt as they are, 9 and 9.
-    assert!(wholes + views >= 20, "{wholes} wholes and {views} views of 12");
+    let (mut wholes, mut views) = (0, 0);
+    for seed in [31, 32, 33] {
+        let shapes: Vec<_> = (0..12)
+            .flat_map(|species| (0..5).map(move |pose| (species, pose)))
+            .map(|(species, pose)| describe(species, pose, seed))
+            .collect();
+        let answer = evaluate(
+            &shapes,
+            Protocol::EvenOdd,
+            &parameters,
+            &[],
+            &Cancel::new(),
+            &|_, _| (),
+        )
+        .unwrap();
+        let right = |name| {
+            let asked = answer.queries.iter().filter(|q| q.name == name);
+            asked.filter(|q| q.correct).count()
+        };
+        wholes += right("pose1");
+        views += right("pose3");
+    }
+    // 31 and 25; were the parts learnt as they are, 29 and 22.
+    assert!(wholes + views >= 54, "{wholes} wholes and {views} views of 36");
 }
 
 #[test]

@@ -283,6 +283,8 @@ parameter_set! {
     refine_below: usize;
     /// n, the number of eigenpairs.
     eigenpairs: usize;
+    /// Eigenpairs on the grid where open queries are compared with training shapes.
+    part_eigenpairs: usize;
     /// The local descriptor.
     descriptor: DescriptorName;
     /// M, the length of a signature.
