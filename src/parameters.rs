@@ -159,7 +159,7 @@ impl Parameters {
             iterations: 25,
             batch: 256,
             samples_per_shape: 900,
-            query_samples: 900,
+            query_samples: 1000,
             rank_by: RankBy::Objective,
             hypotheses: vec![Hypothesis::Plain, Hypothesis::Doubled],
             per_shape: false,
