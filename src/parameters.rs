@@ -7,7 +7,7 @@ use crate::signature::normalise::Normalisation;
 use serde::{Deserialize, Serialize};
 
 /// Goes into the fingerprints, and changes where the same parameters come to describe training shapes differently, so
-/// that what was kept is made anew: 2 since parts are doubled.
+/// that what was kept is made anew: 3 since the grid of parts follows their number of eigenpairs.
 const DESCRIBED: &str = "3";
 
 /// A parameter is outside its range.
@@ -99,6 +99,7 @@ pub struct Parameters {
     pub eigenpairs: usize,
     /// Eigenpairs on the fixed grid, where open queries are compared with training shapes; no fewer than n are solved
     /// for. Parts agree with the whole in what is small, which takes more of them to see.
+    #[serde(default = "part_eigenpairs_before")]
     pub part_eigenpairs: usize,
     /// The local descriptor.
     pub descriptor: Descriptor,
@@ -130,6 +131,11 @@ pub struct Parameters {
     pub per_shape: bool,
     /// Seed of everything that is random.
     pub seed: u64,
+}
+
+/// What an index has that was learnt before there was a choice: its grid ended at log 3000, which is log 15n.
+fn part_eigenpairs_before() -> usize {
+    200
 }
 
 impl Default for Parameters {
@@ -335,5 +341,25 @@ impl Parameters {
         let mut bytes = prefix.as_bytes().to_vec();
         bytes.extend(serde_json::to_vec(self).unwrap_or_default());
         blake3::hash(&bytes).to_hex()[..32].to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_index_from_before_parts_had_their_own_number_of_eigenpairs_keeps_its_grid() {
+        for preset in Preset::ALL {
+            let parameters = Parameters::preset(preset);
+            let mut kept = serde_json::to_value(&parameters).unwrap();
+            kept.as_object_mut().unwrap().remove("part_eigenpairs");
+            let read: Parameters = serde_json::from_value(kept).unwrap();
+            let expected = Parameters {
+                part_eigenpairs: 200,
+                ..parameters
+            };
+            assert_eq!(read, expected);
+        }
     }
 }
