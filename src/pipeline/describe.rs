@@ -51,7 +51,8 @@ pub fn describe_query(
 }
 
 /// Describes a query for the baselines, which compare it with the plain view of training shapes: by that view alone, with
-/// `samples_per_shape` signatures, and without the spectra that the others need.
+/// `samples_per_shape` signatures, and without the whitened and doubled spectra. The solve is that of a training shape, so
+/// that one finds itself to the last bit.
 ///
 /// # Errors
 /// The error of the stage that failed, or [`PipelineError::Cancelled`].

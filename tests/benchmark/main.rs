@@ -2,7 +2,7 @@
 
 use shapelex::benchmark::deform::Deformation;
 use shapelex::benchmark::specimen::Wanted;
-use shapelex::benchmark::{LabelledShape, Protocol, Specimen, evaluate};
+use shapelex::benchmark::{Evaluation, LabelledShape, Protocol, Specimen, evaluate};
 use shapelex::cancel::Cancel;
 use shapelex::mesh::trimesh::face_area;
 use shapelex::mesh::{Components, PrepareOptions, PrepareReport, TriangleSoup, prepare};
@@ -153,6 +153,12 @@ fn labelled(species: &[usize], poses: usize, parameters: &Parameters) -> Vec<Lab
     shapes
 }
 
+/// Every other shape of a class trains, the rest are queried.
+fn even_odd(shapes: &[LabelledShape], parameters: &Parameters) -> Evaluation {
+    let protocol = Protocol::EvenOdd;
+    evaluate(shapes, protocol, parameters, &[], &Cancel::new(), &|_, _| ()).unwrap()
+}
+
 #[test]
 fn an_evaluation_counts_right_and_wrong() {
     let parameters = Parameters {
@@ -214,15 +220,7 @@ fn the_robust_preset_undoes_affine_maps_of_a_known_mesh_and_sees_views() {
             ]
         })
         .collect();
-    let answer = evaluate(
-        &training,
-        Protocol::EvenOdd,
-        &robust,
-        &[],
-        &Cancel::new(),
-        &|_, _| (),
-    )
-    .unwrap();
+    let answer = even_odd(&training, &robust);
     assert_eq!((answer.correct, answer.total), (3, 3), "{:?}", answer.queries);
     // A view is open, so it is described as it is and under the areas assumed, all on the fixed grid.
     let view = Deformation::View.apply(&creature(4, 0), 1, 5);
@@ -296,15 +294,7 @@ fn parts_that_train_tell_what_the_whole_is() {
             .flat_map(|species| (0..5).map(move |pose| (species, pose)))
             .map(|(species, pose)| describe(species, pose, seed))
             .collect();
-        let answer = evaluate(
-            &shapes,
-            Protocol::EvenOdd,
-            &parameters,
-            &[],
-            &Cancel::new(),
-            &|_, _| (),
-        )
-        .unwrap();
+        let answer = even_odd(&shapes, &parameters);
         let right = |name| {
             let asked = answer.queries.iter().filter(|q| q.name == name);
             asked.filter(|q| q.correct).count()
