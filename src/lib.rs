@@ -7,7 +7,7 @@
 //!
 //! Data flows one way, and a module uses only what stands to its left:
 //!
-//! `cancel → mesh → spectral → signature → coding → parameters → ranking → pipeline → (baseline, sample, benchmark) → figure →
+//! `cancel → memory → mesh → spectral → signature → coding → parameters → ranking → pipeline → (baseline, sample, benchmark) → figure →
 //! model → store → jobs → http → cli → main`
 //!
 //! The modules up to `benchmark` are the numeric core: no I/O, no clock, no globals; randomness comes from a seed in
@@ -17,6 +17,7 @@ pub mod baseline;
 pub mod benchmark;
 pub mod cancel;
 pub mod coding;
+pub mod memory;
 pub mod mesh;
 pub mod parameters;
 pub mod pipeline;

@@ -48,10 +48,11 @@ pub fn answer(
     let watch = Stopwatch::default();
     let observer = |stage| watch.begin(stage);
     observer(Stage::Read);
-    let reading = state.memory.reserve_reading(mesh.bytes.len())?;
+    let reserved = state.memory.reservation();
+    reserved.grow(mesh.reading_bytes())?;
     let (format, soup) = mesh.read(&state.config.limits)?;
     // Held beside each other, since preparing, which the reading is reserved for, is a part of describing.
-    let _spectrum = state.memory.reserve(spectrum_bytes(&soup, parameters))?;
+    reserved.grow(spectrum_bytes(&soup, parameters))?;
     let stop = limit.map_or(&work.cancel, |limit| &limit.over);
     let timely = |problem: Problem| match limit {
         Some(limit) if problem.code == Code::Cancelled => limit.nothing_scored(),
@@ -93,7 +94,7 @@ pub fn answer(
             (description, Ranked::from(nearest), Vec::new())
         }
     };
-    drop(reading);
+    drop(reserved);
     let stages = watch.end();
     for (stage, took) in &stages {
         metrics::time_stage(*stage, *took);

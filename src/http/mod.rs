@@ -14,7 +14,6 @@ pub mod extract;
 mod housekeeping;
 pub mod keyring;
 pub mod limits;
-pub mod memory;
 pub mod metrics;
 pub mod openapi;
 pub mod problem;

@@ -3,6 +3,7 @@
 use super::problem::{Code, Problem};
 use crate::coding::CodingError;
 use crate::jobs::JobError;
+use crate::memory::MemoryError;
 use crate::mesh::MeshError;
 use crate::model::{ClassNameError, KeyNameError};
 use crate::parameters::ParameterError;
@@ -46,8 +47,27 @@ impl From<MeshError> for Problem {
                 .with("found", found)
                 .with("limit", limit),
             MeshError::NoAnimation => of(Code::NoAnimation),
+            MeshError::Memory(error) => error.into(),
             MeshError::Cancelled(_) => of(Code::Cancelled),
             MeshError::Invalid { .. } => of(Code::InvalidMesh),
+        }
+    }
+}
+
+/// Seconds a client is asked to wait where memory is not free at the moment.
+const MEMORY_RETRY_AFTER: u64 = 2;
+
+impl From<MemoryError> for Problem {
+    fn from(error: MemoryError) -> Self {
+        let detail = error.to_string();
+        match error {
+            MemoryError::NeverFits { needed, limit } => Self::new(Code::MeshTooLarge, detail)
+                .with("what", "bytes of memory")
+                .with("found", needed)
+                .with("limit", limit),
+            MemoryError::NotNow { .. } => {
+                Self::new(Code::Overloaded, detail).with("retry_after_seconds", MEMORY_RETRY_AFTER)
+            }
         }
     }
 }

@@ -30,7 +30,17 @@ pub struct UploadedMesh {
     pub(super) buffers: Arc<Vec<Part>>,
 }
 
+/// Bytes that reading, cleaning and simplifying take per byte of the file, at most. A triangle of a binary STL has 50
+/// bytes in the file; in memory it is three vertices of 24 bytes and three indices before welding, once more while it
+/// is welded, and edges and quadrics while it is simplified.
+const READING_FACTOR: u64 = 10;
+
 impl UploadedMesh {
+    /// Memory that reading and preparing it takes, in bytes.
+    pub fn reading_bytes(&self) -> u64 {
+        (self.bytes.len() as u64).saturating_mul(READING_FACTOR)
+    }
+
     /// Reads it as one mesh.
     pub fn read(&self, limits: &Limits) -> Result<(Format, TriangleSoup), MeshError> {
         let companions = self.companions();

@@ -2,6 +2,7 @@
 
 use super::Format;
 use crate::cancel::Cancelled;
+use crate::memory::MemoryError;
 
 /// Why a file could not be read or a mesh could not be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -62,6 +63,9 @@ pub enum MeshError {
     /// Poses were asked of a file that has no animation.
     #[error("poses were asked for, but the file has no animation")]
     NoAnimation,
+    /// Its memory was not granted.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

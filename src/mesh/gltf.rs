@@ -19,7 +19,7 @@ mod matrix;
 mod primitive;
 mod scene;
 
-use super::{Format, Limits, MeshError, Pose, Source, TriangleSoup};
+use super::{Format, MeshError, Pose, ReadContext, Source, TriangleSoup};
 use animation::Clip;
 use document::Document;
 use scene::Scene;
@@ -30,8 +30,8 @@ use scene::Scene;
 ///
 /// Errors: [`MeshError::Unsupported`] names a required extension we do not read; [`MeshError::MissingBuffer`] a file
 /// that was not sent along.
-pub fn read(source: &Source<'_>, format: Format, limits: &Limits) -> Result<TriangleSoup, MeshError> {
-    let document = Document::open(source, format, limits)?;
+pub fn read(source: &Source<'_>, format: Format, context: &ReadContext) -> Result<TriangleSoup, MeshError> {
+    let document = Document::open(source, format, &context.limits)?;
     let scene = Scene::open(&document)?;
     scene.build(&scene.nodes.rest())
 }
@@ -45,8 +45,9 @@ pub fn read_poses(
     source: &Source<'_>,
     format: Format,
     poses: usize,
-    limits: &Limits,
+    context: &ReadContext,
 ) -> Result<Vec<Pose>, MeshError> {
+    let limits = &context.limits;
     let document = Document::open(source, format, limits)?;
     let clips = Clip::list(&document)?;
     if clips.is_empty() {

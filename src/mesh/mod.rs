@@ -3,6 +3,7 @@
 pub mod boundary;
 pub mod clean;
 pub mod components;
+pub mod context;
 pub mod decimate;
 pub mod detect;
 pub mod double;
@@ -28,10 +29,11 @@ pub mod trimesh;
 pub mod weld;
 pub mod whiten;
 
+pub use context::ReadContext;
 pub use detect::Format;
 pub use error::MeshError;
 pub use limits::Limits;
 pub use prepare::{Components, PrepareOptions, PrepareReport, prepare, prepare_until};
-pub use read::{Companion, Pose, Source, read, read_poses};
+pub use read::{Companion, Pose, Source, read, read_poses, read_poses_within, read_within};
 pub use soup::TriangleSoup;
 pub use trimesh::TriMesh;

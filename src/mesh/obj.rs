@@ -8,7 +8,7 @@
 //! reordering vertices. A statement it cannot read sends the whole file to tobj, which has the last word.
 
 use super::scan::Scanner;
-use super::{Format, Limits, MeshError, TriangleSoup};
+use super::{Format, Limits, MeshError, ReadContext, TriangleSoup};
 use std::borrow::Cow;
 
 /// Reads an OBJ file. Vertices keep the file's order, used or not; a fourth number on a `v` line is a weight that
@@ -16,7 +16,8 @@ use std::borrow::Cow;
 ///
 /// Errors: [`MeshError::IndexOutOfRange`] gives the index as the file has it, from 1 or negative, and the `f`
 /// statement counted from 1. [`MeshError::Malformed`] names the line.
-pub fn read(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, MeshError> {
+pub fn read(bytes: &[u8], context: &ReadContext) -> Result<TriangleSoup, MeshError> {
+    let limits = &context.limits;
     let text = join_continued_lines(bytes);
     let soup = match parse(&text, limits)? {
         Parsed::Soup(soup) => soup,
@@ -339,7 +340,7 @@ mod tests {
     #[test]
     fn an_unusual_statement_goes_to_tobj_and_is_named_by_its_line() {
         let text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n\nf 1 2 three\n";
-        let error = read(text, &Limits::default()).expect_err("not a face");
+        let error = read(text, &ReadContext::new(Limits::default())).expect_err("not a face");
         assert!(error.to_string().contains("line 5, `f 1 2 three`"), "{error}");
         // A line break tobj takes for a blank and we do not.
         let text = "v 0 0 0\nv 1\u{85}0 0\nv 0 1 0\nf 1 2 3\n";

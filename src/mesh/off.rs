@@ -5,7 +5,7 @@
 //! first on a vertex line (Geomview manual, "OFF Files"), so what follows it is passed over.
 
 use super::scan::Scanner;
-use super::{Format, Limits, MeshError, TriangleSoup};
+use super::{Format, Limits, MeshError, ReadContext, TriangleSoup};
 
 /// The keyword's prefix letters and what follows it, if the text begins with one.
 struct Keyword {
@@ -57,7 +57,8 @@ pub(super) fn has_keyword(bytes: &[u8]) -> bool {
 ///
 /// Errors: faces and vertices are counted from 0, as in the file. [`MeshError::Unsupported`] for the binary form and
 /// for more than three dimensions. [`MeshError::Truncated`] when the counts promise more than there is.
-pub fn read(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, MeshError> {
+pub fn read(bytes: &[u8], context: &ReadContext) -> Result<TriangleSoup, MeshError> {
+    let limits = &context.limits;
     let mut scan = Scanner::new(bytes);
     match keyword(&mut scan) {
         Some(k) if k.binary => return Err(unsupported("OFF BINARY")),

@@ -8,7 +8,7 @@
 //! `tristrips`. All else is passed over.
 
 use super::scan::Scanner;
-use super::{Format, Limits, MeshError, TriangleSoup};
+use super::{Format, Limits, MeshError, ReadContext, TriangleSoup};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, Header, PropertyType, ScalarType};
 
@@ -19,7 +19,8 @@ const MAX_HEADER: usize = 1 << 20;
 ///
 /// Errors: faces and vertices are counted from 0, as in the file. [`MeshError::Truncated`] when the header promises
 /// more than there is.
-pub fn read(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, MeshError> {
+pub fn read(bytes: &[u8], context: &ReadContext) -> Result<TriangleSoup, MeshError> {
+    let limits = &context.limits;
     let (header, payload) = read_header(bytes)?;
     let mut payload = Payload::new(header.encoding, payload);
     let mut soup = TriangleSoup::default();

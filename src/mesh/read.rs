@@ -1,6 +1,6 @@
 //! One entrance for every format.
 
-use super::{Format, Limits, MeshError, TriangleSoup, detect, gltf, obj, off, ply, stl};
+use super::{Format, Limits, MeshError, ReadContext, TriangleSoup, detect, gltf, obj, off, ply, stl};
 
 /// A file that came with another one in the same upload, such as a glTF's `.bin`.
 #[derive(Clone, Debug)]
@@ -40,13 +40,20 @@ pub struct Pose {
 /// [`MeshError::TooSmall`], [`MeshError::Degenerate`] and [`MeshError::NoAnimation`]. Hostile bytes end in an error,
 /// never in a panic or in an allocation beyond `limits`.
 pub fn read(source: &Source<'_>, limits: &Limits) -> Result<(Format, TriangleSoup), MeshError> {
-    let format = format_of(source, limits)?;
+    read_within(source, &limits.into())
+}
+
+/// As [`read`], within the memory of a request and until it is stopped.
+///
+/// Errors: those of [`read`], [`MeshError::Memory`] and [`MeshError::Cancelled`].
+pub fn read_within(source: &Source<'_>, context: &ReadContext) -> Result<(Format, TriangleSoup), MeshError> {
+    let format = format_of(source, &context.limits)?;
     let soup = guarded(format, || match format {
-        Format::Obj => obj::read(source.bytes, limits),
-        Format::Gltf | Format::Glb => gltf::read(source, format, limits),
-        Format::Ply => ply::read(source.bytes, limits),
-        Format::Stl => stl::read(source.bytes, limits),
-        Format::Off => off::read(source.bytes, limits),
+        Format::Obj => obj::read(source.bytes, context),
+        Format::Gltf | Format::Glb => gltf::read(source, format, context),
+        Format::Ply => ply::read(source.bytes, context),
+        Format::Stl => stl::read(source.bytes, context),
+        Format::Off => off::read(source.bytes, context),
     })?;
     Ok((format, soup))
 }
@@ -61,10 +68,21 @@ pub fn read_poses(
     poses: usize,
     limits: &Limits,
 ) -> Result<(Format, Vec<Pose>), MeshError> {
-    let format = format_of(source, limits)?;
-    limits.check_poses(poses)?;
+    read_poses_within(source, poses, &limits.into())
+}
+
+/// As [`read_poses`], within the memory of a request and until it is stopped.
+///
+/// Errors: those of [`read_poses`], [`MeshError::Memory`] and [`MeshError::Cancelled`].
+pub fn read_poses_within(
+    source: &Source<'_>,
+    poses: usize,
+    context: &ReadContext,
+) -> Result<(Format, Vec<Pose>), MeshError> {
+    let format = format_of(source, &context.limits)?;
+    context.limits.check_poses(poses)?;
     let poses = guarded(format, || match format {
-        Format::Gltf | Format::Glb => gltf::read_poses(source, format, poses, limits),
+        Format::Gltf | Format::Glb => gltf::read_poses(source, format, poses, context),
         Format::Obj | Format::Ply | Format::Stl | Format::Off => Err(MeshError::NoAnimation),
     })?;
     Ok((format, poses))

@@ -6,7 +6,7 @@
 //! triangles; corners with the same bits become one vertex.
 
 use super::scan::Scanner;
-use super::{Format, Limits, MeshError, TriangleSoup};
+use super::{Format, Limits, MeshError, ReadContext, TriangleSoup};
 use std::collections::HashMap;
 use std::io::Cursor;
 
@@ -42,7 +42,8 @@ fn is_ascii(bytes: &[u8]) -> bool {
 ///
 /// Errors: [`MeshError::Truncated`] when a binary file is shorter than its count demands or an ascii one ends within a
 /// facet; vertices of [`MeshError::NotFinite`] are numbered after merging.
-pub fn read(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, MeshError> {
+pub fn read(bytes: &[u8], context: &ReadContext) -> Result<TriangleSoup, MeshError> {
+    let limits = &context.limits;
     let soup = if !is_binary(bytes) && is_ascii(bytes) {
         read_ascii(bytes, limits)?
     } else {

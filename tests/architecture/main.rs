@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A module may use only what stands to its left.
-const ORDER: [&str; 19] = [
+const ORDER: [&str; 20] = [
     "cancel",
+    "memory",
     "mesh",
     "spectral",
     "signature",

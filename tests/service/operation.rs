@@ -138,5 +138,5 @@ async fn a_mesh_that_does_not_fit_the_memory_is_refused_before_it_is_built() {
         .fails(413, "mesh_too_large");
     assert_eq!(refused["limit"], 200 << 10);
     assert_eq!(app.get("/v1/classes").await.value()["items"], json!([]));
-    assert_eq!(app.state.memory.reserved(), 0);
+    assert_eq!(app.state.memory.used(), 0);
 }

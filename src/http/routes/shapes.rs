@@ -131,7 +131,8 @@ async fn check_all(
             state
                 .compute
                 .run(patience, state.config.query_timeout, move |work| {
-                    let _reading = shared.memory.reserve_reading(mesh.bytes.len())?;
+                    let reserved = shared.memory.reservation();
+                    reserved.grow(mesh.reading_bytes())?;
                     check_one(&mesh, poses, &limits, &options, &work.cancel)
                 })
         })
