@@ -5,7 +5,7 @@
 //! first on a vertex line (Geomview manual, "OFF Files"), so what follows it is passed over.
 
 use super::scan::Scanner;
-use super::{Format, Limits, MeshError, ReadContext, TriangleSoup};
+use super::{Format, MeshError, ReadContext, TriangleSoup};
 
 /// The keyword's prefix letters and what follows it, if the text begins with one.
 struct Keyword {

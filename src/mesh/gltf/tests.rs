@@ -1,6 +1,7 @@
 //! Real animated files against poses that were baked from them by other software.
 
 use super::*;
+use crate::mesh::Limits;
 use crate::mesh::trimesh::face_area;
 use std::path::{Path, PathBuf};
 
