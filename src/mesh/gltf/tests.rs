@@ -47,7 +47,7 @@ fn poses_match_those_baked_by_other_software() {
     let Some(data) = data("poses_match_those_baked_by_other_software") else {
         return;
     };
-    let limits = Limits::default();
+    let context = ReadContext::new(Limits::default());
     let mut compared = 0;
     for animal in ["Cow", "Fox", "Horse", "Stag", "Wolf"] {
         let bytes =
@@ -56,13 +56,13 @@ fn poses_match_those_baked_by_other_software() {
             bytes: &bytes,
             ..Source::default()
         };
-        let document = Document::open(&source, Format::Gltf, &limits).expect("a document");
+        let document = Document::open(&source, Format::Gltf, &context.limits).expect("a document");
         let scene = Scene::open(&document).expect("a scene");
         let clips = Clip::list(&document).expect("clips");
         let class = data.join("quaternius_animals").join(animal.to_lowercase());
         let baked = |name: &str| -> Option<TriangleSoup> {
             let bytes = std::fs::read(class.join(format!("{name}.off"))).ok()?;
-            Some(crate::mesh::off::read(&bytes, &limits).expect("a valid OFF"))
+            Some(crate::mesh::off::read(&bytes, &context).expect("a valid OFF"))
         };
         // The stag's horns, a second mesh on a joint of its head, were not baked.
         let bind = baked("bind").expect("a bind pose");
@@ -79,7 +79,7 @@ fn poses_match_those_baked_by_other_software() {
             bytes: &text.replace("\"skin\"", "\"xkin\"").into_bytes(),
             ..source
         };
-        let stored = read(&bare, Format::Gltf, &limits).expect("a soup");
+        let stored = read(&bare, Format::Gltf, &context).expect("a soup");
         assert!(difference(&stored, &bind) > 5e-3, "{animal}");
         for clip in &clips {
             for percent in [30, 70] {
