@@ -9,8 +9,10 @@ use shapelex::cancel::Cancel;
 use shapelex::coding::{Dictionary, LearnParameters, encode, learn};
 use shapelex::mesh::{Limits, PrepareOptions, Source, TriangleSoup, prepare, read};
 use shapelex::parameters::{Channel, Parameters, Preset};
+use shapelex::pipeline::views::channel_descriptor;
 use shapelex::pipeline::{Description, describe_query, describe_shape, learn_model, rank};
 use shapelex::ranking::{Index, IndexedClass};
+use shapelex::signature::descriptor::WksRange;
 use shapelex::spectral::{EigenOptions, Operators, assemble, smallest_eigenpairs};
 use std::error::Error;
 use std::io::{BufRead, Read, Write};
@@ -48,6 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 impl State {
     fn run(&mut self, command: &Value) -> Outcome {
         match text(command, "op")? {
+            "setup" => setup(command),
             "operators" => self.operators(command),
             "eigen" => self.eigen(command),
             "describe" => self.describe(command),
@@ -158,7 +161,7 @@ impl State {
         Ok(json!({ "ms": ms, "objective": objective, "nonzeros": nonzeros }))
     }
 
-    /// Loads an index of one dictionary per class, each a file.
+    /// Loads an index of one plain dictionary per class, each a file: the channel closed queries are coded in.
     fn load(&mut self, command: &Value) -> Outcome {
         let parameters = parameters(command)?;
         let mut files: Vec<_> = std::fs::read_dir(text(command, "dir")?)?.collect::<Result<_, _>>()?;
@@ -216,8 +219,32 @@ impl State {
         let query = describe_query(soup, &index.parameters, &Cancel::new(), &|_| ())?;
         let ranking = rank(&query.views, index, index.parameters.rank_by, &Cancel::new())?;
         let ms = milliseconds(started);
-        Ok(json!({ "ms": ms, "best": ranking.classes[0].label, "score": ranking.classes[0].score }))
+        let best = &ranking.classes[0];
+        let vertices = &query.views[0].signatures.vertices;
+        Ok(json!({ "ms": ms, "best": best.label, "score": best.score, "vertices": vertices }))
     }
+}
+
+/// Everything the other side needs to do the same work: the parameters, and the descriptor of each channel.
+fn setup(command: &Value) -> Outcome {
+    let parameters = parameters(command)?;
+    let channels = parameters.channels().into_iter().map(|channel| {
+        let (eigenpairs, descriptor) = channel_descriptor(channel, &parameters);
+        let (low, high) = match descriptor.range {
+            WksRange::Fixed { low, high } => (Some(low), Some(high)),
+            _ => (None, None),
+        };
+        json!({
+            "name": channel,
+            "eigenpairs": eigenpairs,
+            "energies": descriptor.dimension,
+            "sigma_steps": descriptor.sigma_steps,
+            "low": low,
+            "high": high,
+        })
+    });
+    let channels: Vec<Value> = channels.collect();
+    Ok(json!({ "parameters": parameters, "channels": channels }))
 }
 
 fn index_class(class: &Value, parameters: &Parameters) -> Result<IndexedClass, Box<dyn Error>> {

@@ -17,10 +17,6 @@ try:
 except ImportError:
     cholesky = None
 
-PRESETS = {
-    "default": dict(energies=100, atoms=128, sample=900, root=True, frobenius=False),
-    "paper": dict(energies=500, atoms=500, sample=0, root=False, frobenius=True),
-}
 THREADS = int(sys.argv[1]) if len(sys.argv) > 1 else 1
 state = {}
 
@@ -74,24 +70,36 @@ def laplacian(v, f):
     return stiffness, mass / mass.sum()
 
 
-def wks(values, vectors, energies):
-    logs, squared = np.log(values[1:]), vectors[:, 1:] ** 2
-    grid = np.linspace(logs[0], logs[-1] / 1.02, energies)
-    sigma = 6 * (grid[1] - grid[0])
+def wks(values, vectors, channel):
+    n = channel["eigenpairs"]
+    logs, squared = np.log(values[1:n]), vectors[:, 1:n] ** 2
+    low, high = channel["low"], channel["high"]
+    if low is None:
+        low, high = logs[0], logs[-1] / 1.02
+    grid = np.linspace(low, high, channel["energies"])
+    sigma = channel["sigma_steps"] * (grid[1] - grid[0])
     exponent = -((grid[:, None] - logs[None]) ** 2) / (2 * sigma**2)
     weight = np.exp(exponent - exponent.max(1, keepdims=True))
     return (weight / weight.sum(1, keepdims=True)) @ squared.T
 
 
-def signals_of(path, preset, sample):
+def signals_of(path, setup, channels, vertices=None):
+    """Normalised signals of a mesh, M x N for each channel: of the named vertices, or of a training shape's sample."""
     v, f = parse(path)
     stiffness, mass = laplacian(v, f)
-    values, vectors = solve(stiffness, mass, 200, best_solver())
-    s = np.maximum(wks(values, vectors, preset["energies"]), 0)
-    if sample and sample < s.shape[1]:
-        s = s[:, np.random.default_rng(1).choice(s.shape[1], sample, replace=False, p=mass)]
-    s = np.sqrt(s) if preset["root"] else s
-    return np.asfortranarray(s / np.linalg.norm(s, axis=0))
+    values, vectors = solve(stiffness, mass, max(c["eigenpairs"] for c in channels), best_solver())
+    sample = setup["parameters"]["samples_per_shape"]
+    if vertices is None and 0 < sample < len(v):
+        vertices = np.random.default_rng(1).choice(len(v), sample, replace=False, p=mass)
+    if vertices is not None:
+        vectors = vectors[vertices]
+    how = setup["parameters"]["normalisation"]
+    signals = []
+    for channel in channels:
+        s = np.maximum(wks(values, vectors, channel), 0)
+        s = np.sqrt(s) if how == "sqrt_unit" else s
+        signals.append(np.asfortranarray(s if how == "raw" else s / np.linalg.norm(s, axis=0)))
+    return signals
 
 
 def objective(signals, dictionary, parameter):
@@ -107,9 +115,11 @@ def train(signals, atoms, parameter, iterations, batch):
 
 
 def index_class(job):
-    preset, meshes = job
-    signals = np.asfortranarray(np.hstack([signals_of(m, preset, preset["sample"]) for m in meshes]))
-    train(signals, preset["atoms"], 0.5, 25, 256)
+    setup, meshes = job
+    p = setup["parameters"]
+    described = [signals_of(m, setup, setup["channels"]) for m in meshes]
+    for shapes in zip(*described):
+        train(np.asfortranarray(np.hstack(shapes)), p["atoms"], p["lambda"], p["iterations"], p["batch"])
     return os.getpid(), peak()
 
 
@@ -189,7 +199,7 @@ def run(c):
         residual = state["s"] - state["d"] @ codes
         return dict(ms=ms, objective=float(0.5 * (residual**2).sum() + c["parameter"] * abs(codes).sum()))
     if op == "index":
-        jobs = [(PRESETS[c["preset"]], k["meshes"]) for k in c["classes"]]
+        jobs = [(c["setup"], k["meshes"]) for k in c["classes"]]
         started = time.perf_counter()
         with multiprocessing.Pool(THREADS) as pool:
             peaks = dict(sorted(pool.map(index_class, jobs, chunksize=1), key=lambda p: p[1]))
@@ -197,19 +207,21 @@ def run(c):
     if op == "load":
         import pathlib
 
-        preset = PRESETS[c["preset"]]
-        state["preset"] = preset
+        state["setup"] = c["setup"]
+        # Closed queries are coded in the first channel, the plain one.
+        energies = c["setup"]["channels"][0]["energies"]
         files = sorted(pathlib.Path(c["dir"]).iterdir())
-        state["index"] = {p.name: load(p, preset["energies"]) for p in files}
+        state["index"] = {p.name: load(p, energies) for p in files}
         return {}
     if op == "query":
-        preset = state["preset"]
+        setup = state["setup"]
+        frobenius_wanted = setup["parameters"]["rank_by"] == "frobenius"
         started = time.perf_counter()
-        signals = signals_of(c["mesh"], preset, 0)
+        (signals,) = signals_of(c["mesh"], setup, setup["channels"][:1], c["vertices"])
         scores = {}
         for name, d in state["index"].items():
-            total, frobenius = objective(signals, d, 0.5)
-            scores[name] = frobenius if preset["frobenius"] else total / signals.shape[1]
+            total, frobenius = objective(signals, d, setup["parameters"]["lambda"])
+            scores[name] = frobenius if frobenius_wanted else total / signals.shape[1]
         best = min(scores, key=scores.get)
         return dict(ms=(time.perf_counter() - started) * 1e3, best=best, score=float(scores[best]))
     if op == "convert":

@@ -5,6 +5,7 @@ The ratio is the median of the rounds' ratios, with its quartiles; `agree` says 
 """
 
 import argparse
+import itertools
 import json
 import math
 import os
@@ -53,12 +54,13 @@ def rested(side):
 
 
 class Table:
-    def __init__(self):
+    def __init__(self, most_rounds):
         self.rows = {}
+        self.most_rounds = most_rounds
 
     def measure(self, name, rounds, ours, theirs, agree):
         pairs = []
-        for _ in range(rounds):
+        for _ in range(int(min(rounds, self.most_rounds))):
             pairs.append(tuple(rested(side) for side in (ours, theirs)))
         ratios = [b["ms"] / a["ms"] for a, b in pairs]
         quartiles = statistics.quantiles(ratios, n=4) if len(ratios) > 1 else [ratios[0]] * 3
@@ -123,31 +125,40 @@ def main():
     parser.add_argument("--ours", required=True)
     parser.add_argument("--shapelex", required=True)
     parser.add_argument("--quick", action="store_true", help="smaller inputs and fewer rounds, under 5 minutes")
+    parser.add_argument("--smoke", action="store_true", help="every row once on tiny inputs; fails where answers differ")
     parser.add_argument("--json", action="store_true", help="the last line is one object of all rows")
     parser.add_argument("--threads", default="1,2")
     parser.add_argument("--rows", default="eigen,lasso,learn,query,reindex,read")
     options = parser.parse_args()
+    if options.smoke:
+        options.quick, options.threads = True, "1"
     wanted = options.rows.split(",")
-    table = Table()
+    table = Table(1 if options.smoke else math.inf)
     print(f"{'':58} {'ours ms':>10} {'peer ms':>10} {'ratio':>8} (quartiles) {'MB':>6} {'peer':>6}  agree")
     with tempfile.TemporaryDirectory() as scratch:
         scratch = Path(scratch)
-        zoo = creatures(options.shapelex, scratch / "zoo", 12, 5 if options.quick else 13)
+        classes, poses = (3, 3) if options.smoke else (12, 5 if options.quick else 13)
+        zoo = creatures(options.shapelex, scratch / "zoo", classes, poses)
         for threads in map(int, options.threads.split(",")):
             # Memory is that of a process, so every kind of work has processes of its own.
             ours = lambda: Process([options.ours], threads)
             peer = lambda: Process([sys.executable, str(HERE / "peer.py"), str(threads)], threads)
             label = f"{threads} thread{'s' if threads > 1 else ''}"
             if "eigen" in wanted:
-                eigen(table, ours, peer, zoo, scratch, label, options.quick)
+                eigen(table, ours, peer, zoo, scratch, label, options)
             if "lasso" in wanted or "learn" in wanted:
-                coding(table, ours, peer, zoo, scratch, label, options.quick, wanted, threads)
+                coding(table, ours, peer, zoo, scratch, label, options, wanted, threads)
             if "query" in wanted or "reindex" in wanted:
-                whole(table, ours, peer, zoo, scratch, label, options.quick, wanted, threads)
+                whole(table, ours, peer, zoo, scratch, label, options, wanted, threads)
             if "read" in wanted and threads == 1:
-                reading(table, ours(), peer(), zoo, scratch, options.quick)
+                reading(table, ours(), peer(), zoo, scratch, options)
     if options.json:
         print(json.dumps(table.rows))
+    differ = [name for name, row in table.rows.items() if not row["agree"]]
+    if differ:
+        raise SystemExit(f"the two sides differ in {len(differ)} of {len(table.rows)} rows: {'; '.join(differ)}")
+    if options.smoke:
+        print(f"{len(table.rows)} rows ran, and both sides agree in all of them")
 
 
 def torus(target, around, along):
@@ -169,10 +180,11 @@ def torus(target, around, along):
         out.write("".join("f %d %d %d\n" % tuple(k + 1 for k in f) for f in faces))
 
 
-def eigen(table, ours, peer, zoo, scratch, label, quick):
+def eigen(table, ours, peer, zoo, scratch, label, options):
+    quick = options.quick
     first = next(iter(zoo.values()))[0]
     inputs = [("zoo", first)]
-    for times in (1, 2):  # About 9k and 35k vertices.
+    for times in () if options.smoke else (1, 2):  # About 9k and 35k vertices.
         finer = scratch / f"finer{times}.obj"
         if not finer.exists():
             subdivide(first, finer, times)
@@ -182,7 +194,7 @@ def eigen(table, ours, peer, zoo, scratch, label, quick):
         if not mesh.exists():
             torus(mesh, around, along)
         inputs.append(("torus", str(mesh)))
-    for path in ("tosca_lowres/cat/cat0.off", "sumner/cat/cat-reference.obj"):
+    for path in () if options.smoke else ("tosca_lowres/cat/cat0.off", "sumner/cat/cat-reference.obj"):
         real = ROOT.parent / "shared" / "data" / path
         if real.exists():
             inputs.append((path, str(real)))
@@ -201,11 +213,13 @@ def eigen(table, ours, peer, zoo, scratch, label, quick):
         )
 
 
-def coding(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
+def coding(table, ours, peer, zoo, scratch, label, options, wanted, threads):
+    quick = options.quick
     class_meshes = next(iter(zoo.values()))
     describing, judging = ours(), peer()
-    settings = [("default", "sqrt_unit", 128), ("paper", "unit", 500), ("paper", "raw", 500)]
-    for preset, normalisation, atoms in settings:
+    for preset, normalisation in (("default", "sqrt_unit"), ("paper", "unit"), ("paper", "raw")):
+        parameters = describing(op="setup", preset=preset)["parameters"]
+        atoms, batch = parameters["atoms"], parameters["batch"]
         parts = []
         for i, mesh in enumerate(class_meshes[:5]):
             path = scratch / f"signals{i}"
@@ -218,7 +232,7 @@ def coding(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
         held_out.write_bytes(parts[-1].read_bytes()[: 1500 * rows * 8])
         training = scratch / "training"
         training.write_bytes(b"".join(p.read_bytes() for p in parts[:-1]))
-        setup = dict(signals=str(training), rows=rows, atoms=atoms, batch=256)
+        setup = dict(signals=str(training), rows=rows, atoms=atoms, batch=batch)
         name = f"{preset} preset, {normalisation}"
         # Both sides learn a class on one thread; classes are what runs in parallel.
         if normalisation != "raw" and "learn" in wanted and threads == 1:
@@ -241,19 +255,21 @@ def coding(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
             )
         judging(op="learn", **setup, parameter=0.5, iterations=25, dictionary=str(scratch / "d"))
         files = dict(signals=str(held_out), dictionary=str(scratch / "d"), rows=rows)
+        calls = 1 if options.smoke else CALLS
         a, b = ours(), peer()
         a(op="dictionary", **files)
         b(op="dictionary", **files)
         for parameter in (0.5, 0.05) if "lasso" in wanted else ():
             table.measure(
                 f"Lasso of 1500 signals, {name}, lambda {parameter}, {label}", 3 if quick else 7,
-                lambda: a(op="lasso", calls=CALLS, **{"lambda": parameter}),
-                lambda: b(op="lasso", calls=CALLS, parameter=parameter),
+                lambda: a(op="lasso", calls=calls, **{"lambda": parameter}),
+                lambda: b(op="lasso", calls=calls, parameter=parameter),
                 lambda a, b: abs(a["objective"] - b["objective"]) <= 1e-6 * b["objective"],
             )
 
 
-def whole(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
+def whole(table, ours, peer, zoo, scratch, label, options, wanted, threads):
+    quick = options.quick
     held_out = {name: meshes[-1] for name, meshes in zoo.items()}
     classes = [dict(label=name, meshes=meshes[:-1]) for name, meshes in zoo.items()]
     for preset in ("default", "paper"):
@@ -263,13 +279,15 @@ def whole(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
         directory.mkdir(exist_ok=True)
         poses = len(classes[0]["meshes"])
         learner = ours()
+        # The peer works with the parameters that ours uses, whatever the presets are.
+        setup = {k: v for k, v in learner(op="setup", preset=preset).items() if k != "mb"}
         if preset == "default" and "reindex" in wanted:
             # As many processes as threads, of one thread each.
             other = Process([sys.executable, str(HERE / "peer.py"), str(threads)], 1)
             table.measure(
-                f"whole reindex, 12 classes x {poses} shapes, {preset} preset, {label} against as many processes", 1,
+                f"whole reindex, {len(classes)} classes x {poses} shapes, {preset} preset, {label} against as many processes", 1,
                 lambda: learner(op="index", preset=preset, classes=classes, out=str(directory)),
-                lambda: other(op="index", preset=preset, classes=classes),
+                lambda: other(op="index", setup=setup, classes=classes),
                 lambda a, b: True,
             )
         else:
@@ -278,26 +296,29 @@ def whole(table, ours, peer, zoo, scratch, label, quick, wanted, threads):
             continue
         a, b = ours(), peer()
         a(op="load", preset=preset, dir=str(directory))
-        b(op="load", preset=preset, dir=str(directory))
-        meshes = list(held_out.items())
-        turn = {"ours": 0, "theirs": 0}
+        b(op="load", setup=setup, dir=str(directory))
+        meshes = itertools.cycle(held_out.values())
+        asked = {}
 
-        def next_mesh(side):
-            name, mesh = meshes[turn[side] % len(meshes)]
-            turn[side] += 1
-            return mesh
+        def ask_ours():
+            asked["mesh"] = next(meshes)
+            answer = a(op="query", mesh=asked["mesh"])
+            asked["vertices"] = answer["vertices"]
+            return answer
 
         table.measure(
-            f"whole query, 12 classes, {preset} preset, {label}", 4 if quick else 12,
-            lambda: a(op="query", mesh=next_mesh("ours")),
-            lambda: b(op="query", mesh=next_mesh("theirs")),
+            f"whole query, {len(classes)} classes, {preset} preset, {label}", 4 if quick else 12,
+            ask_ours,
+            # The same mesh, and the signatures of the same vertices.
+            lambda: b(op="query", **asked),
             lambda a, b: a["best"] == b["best"] and abs(a["score"] - b["score"]) < 1e-4 * b["score"],
         )
 
 
-def reading(table, ours, peer, zoo, scratch, quick):
+def reading(table, ours, peer, zoo, scratch, options):
+    quick = options.quick
     big = scratch / "big.obj"
-    subdivide(next(iter(zoo.values()))[0], big, 4)  # A million faces.
+    subdivide(next(iter(zoo.values()))[0], big, 1 if options.smoke else 4)  # A million faces.
     peer(op="convert", mesh=str(big), out=str(scratch))
     for kind in ("obj", "ply", "glb"):
         mesh = str(scratch / f"big.{kind}")

@@ -8,7 +8,7 @@ pub mod held_out;
 pub mod learn;
 pub mod prepared;
 pub mod stage;
-mod views;
+pub mod views;
 
 pub use crate::ranking::{rank, rank_top};
 pub use describe::{Description, describe_both, describe_plain, describe_query, describe_shape};

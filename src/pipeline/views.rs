@@ -32,6 +32,14 @@ fn fixed_grid(n: usize) -> DescriptorParameters {
     }
 }
 
+/// How many eigenpairs the signatures of a channel are built from, and their descriptor.
+pub fn channel_descriptor(channel: Channel, parameters: &Parameters) -> (usize, DescriptorParameters) {
+    match channel {
+        Channel::FixedGrid => (parameters.part_eigenpairs, fixed_grid(parameters.part_eigenpairs)),
+        Channel::Plain | Channel::Whitened => (parameters.eigenpairs, parameters.descriptor_parameters()),
+    }
+}
+
 impl PreparedShape {
     /// The views of a training shape: one per channel. One that is a part is doubled, as a query is; its full area is
     /// not known either, so the fixed grid gets a view for each that is assumed, of a share of the vertices.
@@ -213,10 +221,7 @@ impl PreparedShape {
         channel: Channel,
         area_scale: f64,
     ) -> Result<View, PipelineError> {
-        let (n, descriptor) = match channel {
-            Channel::FixedGrid => (parameters.part_eigenpairs, fixed_grid(parameters.part_eigenpairs)),
-            Channel::Plain | Channel::Whitened => (parameters.eigenpairs, parameters.descriptor_parameters()),
-        };
+        let (n, descriptor) = channel_descriptor(channel, parameters);
         let mut signatures = describe_vertices(&eigenpairs.first(n), vertices, &descriptor)?;
         normalise(&mut signatures, parameters.normalisation);
         Ok(View {

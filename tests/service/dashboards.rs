@@ -68,3 +68,22 @@ fn the_manual_explains_every_alert() {
         );
     }
 }
+
+#[test]
+fn the_systemd_unit_starts_the_service_as_the_manual_says() {
+    let unit = file("shapelex.service");
+    let value = |key: &str| {
+        let line = unit
+            .lines()
+            .find_map(|line| line.strip_prefix(&format!("{key}=")));
+        line.unwrap_or_else(|| panic!("the unit has no {key}"))
+    };
+    assert!(value("ExecStart").ends_with("shapelex serve --data /var/lib/shapelex"));
+    assert_eq!(value("StateDirectory"), "shapelex");
+    // systemd must not kill a service that is still closing its store.
+    let grace: u64 = value("TimeoutStopSec").parse().unwrap();
+    let shutdown = shapelex::http::ServiceConfig::default()
+        .shutdown_timeout
+        .as_secs();
+    assert!(grace > 2 * shutdown, "{grace} s against {shutdown} s");
+}
