@@ -168,6 +168,10 @@ settings! {
     snapshot_keep: usize = 7, "SHAPELEX_SNAPSHOT_KEEP", "COUNT";
     /// Size of a snapshot that is restored, packed and unpacked, at most, in MiB
     snapshot_max_mib: u64 = 16_384, "SHAPELEX_SNAPSHOT_MAX_MIB", "MIB";
+    /// Time between checks of all stored files and records, in hours; 0 makes none
+    scrub_every_hours: u64 = 168, "SHAPELEX_SCRUB_EVERY_HOURS", "HOURS";
+    /// Most that is read per second while stored files and records are checked, in MiB
+    scrub_mib_per_second: u64 = 16, "SHAPELEX_SCRUB_MIB_PER_SECOND", "MIB";
     /// Page cache of the key-value store, in MiB
     cache_mib: u64 = 64, "SHAPELEX_CACHE_MIB", "MIB";
 }
@@ -225,7 +229,7 @@ fn one_line(error: &toml::de::Error, text: &str) -> String {
 
 impl Config {
     fn validate(&self) -> Result<(), ConfigError> {
-        let at_least_one: [(&'static str, u64); 17] = [
+        let at_least_one: [(&'static str, u64); 18] = [
             ("max_body_mib", self.max_body_mib as u64),
             ("max_upload_files", self.max_upload_files as u64),
             ("max_unpacked_mib", self.max_unpacked_mib as u64),
@@ -240,6 +244,7 @@ impl Config {
             ("job_queue", self.job_queue as u64),
             ("snapshot_keep", self.snapshot_keep as u64),
             ("snapshot_max_mib", self.snapshot_max_mib),
+            ("scrub_mib_per_second", self.scrub_mib_per_second),
             ("cache_mib", self.cache_mib),
             ("max_connections", self.max_connections as u64),
             ("header_timeout_seconds", self.header_timeout_seconds),
@@ -322,6 +327,9 @@ impl Config {
                 .then(|| Duration::from_secs(60 * self.snapshot_every_minutes)),
             snapshot_keep: self.snapshot_keep,
             snapshot_max_bytes: self.snapshot_max_mib << 20,
+            scrub_every: (self.scrub_every_hours > 0)
+                .then(|| Duration::from_secs(3600 * self.scrub_every_hours)),
+            scrub_bytes_per_second: self.scrub_mib_per_second << 20,
             shutdown_timeout: Duration::from_secs(self.shutdown_timeout_seconds),
         }
     }

@@ -18,7 +18,8 @@ const MAX_BYTES: u64 = 64 << 20;
 pub struct Audit {
     path: PathBuf,
     max_bytes: u64,
-    file: Mutex<Open>,
+    /// `None` where it could not be opened yet.
+    file: Mutex<Option<Open>>,
 }
 
 struct Open {
@@ -80,9 +81,18 @@ impl Audit {
         Self::with_limit(data, MAX_BYTES)
     }
 
+    /// A log that is opened at its first entry.
+    pub fn later(data: &Path) -> Self {
+        Self {
+            path: data.join(FILE),
+            max_bytes: MAX_BYTES,
+            file: Mutex::new(None),
+        }
+    }
+
     fn with_limit(data: &Path, max_bytes: u64) -> std::io::Result<Self> {
         let path = data.join(FILE);
-        let file = Mutex::new(Open::at(&path)?);
+        let file = Mutex::new(Some(Open::at(&path)?));
         Ok(Self {
             path,
             max_bytes,
@@ -102,13 +112,18 @@ impl Audit {
 
     fn append(&self, mut line: Vec<u8>) -> std::io::Result<()> {
         line.push(b'\n');
-        let mut open = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut place = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut open = match place.take() {
+            Some(open) => open,
+            None => Open::at(&self.path)?,
+        };
         if open.length > 0 && open.length + line.len() as u64 > self.max_bytes {
             std::fs::rename(&self.path, self.path.with_extension("log.1"))?;
-            *open = Open::at(&self.path)?;
+            open = Open::at(&self.path)?;
         }
         open.file.write_all(&line)?;
         open.length += line.len() as u64;
+        *place = Some(open);
         Ok(())
     }
 }

@@ -74,6 +74,10 @@ pub struct ServiceConfig {
     pub snapshot_keep: usize,
     /// Bytes of a snapshot that is restored, packed and unpacked, at most.
     pub snapshot_max_bytes: u64,
+    /// How often all stored files and records are checked; `None` for never.
+    pub scrub_every: Option<Duration>,
+    /// Bytes read per second while they are checked.
+    pub scrub_bytes_per_second: u64,
     /// How long running work may go on when the service is asked to stop.
     pub shutdown_timeout: Duration,
 }
@@ -115,6 +119,8 @@ impl Default for ServiceConfig {
             snapshot_every: None,
             snapshot_keep: 7,
             snapshot_max_bytes: 16 << 30,
+            scrub_every: Some(Duration::from_secs(168 * 3600)),
+            scrub_bytes_per_second: 16 << 20,
             shutdown_timeout: Duration::from_secs(10),
         }
     }

@@ -3,7 +3,7 @@
 
 use super::state::{AppState, Parts};
 use crate::model::{Snapshot, SnapshotOrigin};
-use crate::store::{Health, StoreError};
+use crate::store::StoreError;
 use jiff::Timestamp;
 use std::time::{Duration, Instant};
 
@@ -31,21 +31,21 @@ pub async fn run(state: AppState) {
     }
 }
 
-/// Makes a store writable again that was full.
+/// Makes a store writable again that was full, and does what the full disk kept from being done.
 fn recover(parts: &Parts) {
-    if parts.store.health() == Health::Ready {
+    match parts.store.recover() {
+        Ok(()) => {}
+        Err(StoreError::Full { detail }) => return tracing::debug!(detail, "the disk is still full"),
+        // A start afresh is the way out; readiness says so.
+        Err(StoreError::ReadOnly { .. } | StoreError::RecoveryMode { .. }) => return,
+        Err(error) => return tracing::error!(%error, "the store does not recover"),
+    }
+    if !parts.jobs.is_behind() {
         return;
     }
-    match parts.store.recover() {
-        Ok(()) => {
-            if let Err(error) = parts.jobs.write_ends() {
-                tracing::error!(%error, "the ends of jobs are still not written");
-            }
-        }
-        Err(StoreError::Full { detail }) => tracing::debug!(detail, "the disk is still full"),
-        // A start afresh is the way out; readiness says so.
-        Err(StoreError::ReadOnly { .. } | StoreError::RecoveryMode { .. }) => {}
-        Err(error) => tracing::error!(%error, "the store does not recover"),
+    match parts.jobs.catch_up() {
+        Ok(()) => tracing::info!("what the full disk kept from being done is done"),
+        Err(error) => tracing::error!(%error, "the index and the jobs are still not what they should be"),
     }
 }
 

@@ -6,6 +6,7 @@
 use super::problem::Code;
 use super::state::AppState;
 use crate::pipeline::Stage;
+use crate::store::ScrubReport;
 use ::metrics::{counter, describe_counter, describe_gauge, describe_histogram, gauge, histogram};
 use metrics_exporter_prometheus::{PrometheusBuilder, PrometheusHandle};
 use std::sync::OnceLock;
@@ -68,7 +69,25 @@ fn describe() {
         "shapelex_index_generation",
         "Generation of the index; 0 before the first"
     );
-    describe_gauge!("shapelex_index_classes", "Classes with a dictionary");
+    describe_gauge!(
+        "shapelex_index_classes",
+        "Classes of the catalogue that the index knows"
+    );
+    describe_gauge!(
+        "shapelex_disk_free_bytes",
+        "Bytes the file system of the data directory has free"
+    );
+    describe_gauge!(
+        "shapelex_damaged_originals",
+        "Uploaded files found damaged or gone"
+    );
+    describe_gauge!("shapelex_damaged_records", "Records found damaged");
+    describe_gauge!(
+        "shapelex_scrub_timestamp_seconds",
+        "When the last check of all stored files and records ended, in seconds since 1970; 0 before the first"
+    );
+    describe_gauge!("shapelex_scrub_originals", "Uploaded files the last check read");
+    describe_gauge!("shapelex_scrub_records", "Records the last check read");
     describe_gauge!("shapelex_ready", "1 where the service is ready");
 }
 
@@ -142,13 +161,33 @@ pub fn render(state: &AppState) -> String {
     gauge!("shapelex_api_keys").set(state.keys.len() as f64);
     gauge!("shapelex_jobs_pending").set(state.jobs.queue_depth() as f64);
     gauge!("shapelex_index_generation").set(live.generation.as_ref().map_or(0, |g| g.number) as f64);
-    gauge!("shapelex_index_classes").set(live.index.classes.len() as f64);
     gauge!("shapelex_ready").set(f64::from(u8::from(state.readiness().is_ready())));
+    let exists = |label: &str| match label.parse() {
+        Ok(id) => state.store.class(id).is_ok(),
+        Err(_) => false,
+    };
+    let known = live.index.classes.iter().filter(|class| exists(&class.label));
+    gauge!("shapelex_index_classes").set(known.count() as f64);
     if let Ok(statistics) = state.store.statistics() {
         gauge!("shapelex_classes").set(statistics.classes as f64);
         gauge!("shapelex_shapes").set(statistics.shapes as f64);
         gauge!("shapelex_original_bytes").set(statistics.bytes as f64);
     }
+    if let Some(free) = state.store.disk_free() {
+        gauge!("shapelex_disk_free_bytes").set(free as f64);
+    }
+    read_integrity(state);
     handle.run_upkeep();
     handle.render()
+}
+
+fn read_integrity(state: &AppState) {
+    let damage = state.store.damage();
+    gauge!("shapelex_damaged_originals").set(damage.originals.len() as f64);
+    gauge!("shapelex_damaged_records").set(damage.records.len() as f64);
+    let last = state.store.last_scrub();
+    let of = |value: fn(&ScrubReport) -> f64| last.as_ref().map_or(0.0, value);
+    gauge!("shapelex_scrub_timestamp_seconds").set(of(|last| last.finished_at.as_second() as f64));
+    gauge!("shapelex_scrub_originals").set(of(|last| last.originals as f64));
+    gauge!("shapelex_scrub_records").set(of(|last| last.records as f64));
 }

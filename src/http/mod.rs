@@ -23,6 +23,7 @@ mod recovery_mode;
 pub mod respond;
 pub mod router;
 mod routes;
+mod scrubber;
 pub mod serve;
 pub mod state;
 mod time_limit;

@@ -225,7 +225,14 @@ fn problems_of(operation: &str) -> Vec<Code> {
         "list_shapes" => vec![InvalidRequest, InvalidQuery, InvalidCursor, ClassNotFound],
         "get_shape" => vec![InvalidRequest, ClassNotFound, ShapeNotFound],
         "delete_shape" => [WRITE, &[InvalidRequest, ClassNotFound, ShapeNotFound]].concat(),
-        "get_original" => vec![InvalidRequest, ClassNotFound, ShapeNotFound, OriginalMissing],
+        "get_original" => vec![
+            InvalidRequest,
+            ClassNotFound,
+            ShapeNotFound,
+            OriginalMissing,
+            OriginalDamaged,
+            StorageDenied,
+        ],
         "start_reindex" => [
             JSON,
             WRITE,

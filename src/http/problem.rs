@@ -88,7 +88,8 @@ codes! {
     ClassNotFound, "class_not_found", 404, "There is no such class";
     ShapeNotFound, "shape_not_found", 404, "There is no such shape in this class";
     JobNotFound, "job_not_found", 404, "There is no such job";
-    OriginalMissing, "original_missing", 500, "The stored file is gone or damaged";
+    OriginalMissing, "original_missing", 500, "The stored file is gone";
+    OriginalDamaged, "original_damaged", 500, "The stored file is not what was uploaded";
     ClassExists, "class_exists", 409, "A class of that name exists";
     JobFinished, "job_finished", 409, "The job has ended and cannot be cancelled";
     RevisionMismatch, "revision_mismatch", 412, "The class has changed since it was read";
@@ -115,6 +116,7 @@ codes! {
     StoreUnavailable, "store_unavailable", 503, "The store does not accept this now";
     RecoveryMode, "recovery_mode", 503, "The service only shows the catalogue and changes nothing";
     StorageFull, "storage_full", 507, "There is no space left";
+    StorageDenied, "storage_denied", 503, "The service may not use its data directory";
     Cancelled, "cancelled", 503, "The work was stopped before it had a result";
     DeadlineExceeded, "deadline_exceeded", 504, "The answer took longer than the time limit";
     Internal, "internal", 500, "Something went wrong inside the service";

@@ -10,7 +10,7 @@ use crate::parameters::ParameterError;
 use crate::pipeline::PipelineError;
 use crate::ranking::RankingError;
 use crate::spectral::SpectralError;
-use crate::store::StoreError;
+use crate::store::{OriginalDamage, StoreError};
 
 impl From<MeshError> for Problem {
     fn from(error: MeshError) -> Self {
@@ -151,6 +151,15 @@ pub fn recovery_mode() -> Problem {
     .with("retry_after_seconds", 30)
 }
 
+/// The disk was too full to read the index: says that this passes.
+pub fn index_unread() -> Problem {
+    Problem::new(
+        Code::StorageFull,
+        "the disk was too full at the start to read the index; it is read by itself once there is space",
+    )
+    .with("retry_after_seconds", 10)
+}
+
 /// The index knows nothing for the baselines: says what to do next.
 pub fn baselines_missing(rank_by: &str) -> Problem {
     Problem::new(
@@ -199,6 +208,17 @@ impl From<StoreError> for Problem {
             .with("retry_after_seconds", 30)
             .logged(detail),
             StoreError::RecoveryMode { .. } => recovery_mode(),
+            StoreError::Original { content, damage } => Self::new(
+                match damage {
+                    OriginalDamage::Missing => Code::OriginalMissing,
+                    OriginalDamage::Changed | OriginalDamage::Unreadable => Code::OriginalDamaged,
+                },
+                detail,
+            )
+            .with("content", content.to_string()),
+            StoreError::Denied { .. } => Self::new(Code::StorageDenied, detail.clone())
+                .with("retry_after_seconds", 30)
+                .logged(detail),
             StoreError::Damaged { .. } => Self::new(
                 Code::Internal,
                 "a stored record is damaged; the log has it under this request id",

@@ -6,8 +6,10 @@
 
 use super::housekeeping;
 use super::router::router;
+use super::scrubber;
 use super::state::{AppState, OpenError};
 use super::tls::{Tls, TlsError};
+use crate::store::Health;
 use axum::Router;
 use axum::extract::Request;
 use axum_server::{Handle, Server};
@@ -46,6 +48,7 @@ pub async fn serve(
     shutdown: impl Future<Output = ()> + Send + 'static,
 ) -> Result<(), ServeError> {
     tokio::spawn(housekeeping::run(state.clone()));
+    tokio::spawn(scrubber::run(state.clone()));
     let tls = Tls::load(&state.config)?;
     let handle = Handle::new();
     let deadline = state.config.shutdown_timeout;
@@ -69,7 +72,9 @@ pub async fn serve(
         if !closing.jobs.shutdown(deadline) {
             tracing::warn!("the worker was still busy at the deadline; its job runs again at the next start");
         }
-        if let Err(error) = closing.store.flush() {
+        if closing.store.health() == Health::Ready
+            && let Err(error) = closing.store.flush()
+        {
             tracing::error!(%error, "the last flush failed");
         }
     })

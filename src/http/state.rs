@@ -7,10 +7,10 @@ use super::config::ServiceConfig;
 use super::keyring::Keyring;
 use super::limits::Limits;
 use super::problem::Problem;
-use super::{metrics, openapi, recovery_mode};
+use super::{metrics, openapi, problem_from, recovery_mode};
 use crate::jobs::{JobError, Jobs};
 use crate::memory::MemoryBudget;
-use crate::store::{Health, Store, StoreError};
+use crate::store::{Damage, Health, Store, StoreError};
 use std::net::SocketAddr;
 use std::ops::Deref;
 use std::sync::{Arc, Mutex};
@@ -90,17 +90,28 @@ impl Deref for AppState {
     }
 }
 
+/// How a part of the service is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Condition {
+    /// It works.
+    Well,
+    /// It works, and an operator should look at it.
+    Degraded(String),
+    /// It does not work.
+    Down(String),
+}
+
 /// What the service needs to answer, and whether it has it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Readiness {
-    /// Part → `None` where it is well, or what is wrong.
-    pub checks: Vec<(&'static str, Option<String>)>,
+    /// Every part and how it is.
+    pub checks: Vec<(&'static str, Condition)>,
 }
 
 impl Readiness {
-    /// Whether everything is well.
+    /// Whether no part is down.
     pub fn is_ready(&self) -> bool {
-        self.checks.iter().all(|(_, wrong)| wrong.is_none())
+        !self.checks.iter().any(|(_, c)| matches!(c, Condition::Down(_)))
     }
 }
 
@@ -114,7 +125,15 @@ impl AppState {
         let document = |e: &dyn std::fmt::Display| OpenError::Document(e.to_string());
         let document_yaml = openapi::document_yaml().map_err(|e| document(&e))?;
         let document_json = openapi::document_json().map_err(|e| document(&e))?;
-        let store = Store::open(&config.data_dir, &config.store)?;
+        let store = match Store::open(&config.data_dir, &config.store) {
+            // What cannot be written can still be shown.
+            Err(denied @ StoreError::Denied { .. }) => {
+                let store = Store::open_read_only(&config.data_dir, denied)?;
+                tracing::error!(why = store.recovery_mode(), "recovery mode: only the catalogue is served");
+                store
+            }
+            opened => opened?,
+        };
         for line in store.recovery() {
             tracing::warn!(recovered = line, "the data directory was repaired");
         }
@@ -125,8 +144,17 @@ impl AppState {
                 data: config.data_dir,
             });
         }
-        let audit = Audit::open(&config.data_dir).map_err(OpenError::Audit)?;
-        if let Some(why) = recovery_mode::reason(&config, &store) {
+        let audit = match Audit::open(&config.data_dir) {
+            // Nothing is changed for now; the file is opened at the first entry.
+            Err(error) if store.health() != Health::Ready => {
+                tracing::warn!(%error, "the audit log cannot be opened yet");
+                Audit::later(&config.data_dir)
+            }
+            opened => opened.map_err(OpenError::Audit)?,
+        };
+        if store.recovery_mode().is_none()
+            && let Some(why) = recovery_mode::reason(&config, &store)
+        {
             store.enter_recovery_mode(why);
         }
         let jobs = match Jobs::start(store.clone(), config.job_options()) {
@@ -185,20 +213,66 @@ impl AppState {
         }
     }
 
+    /// Refuses a query where the index is not loaded, so that it is never taken for an empty one.
+    ///
+    /// # Errors
+    /// `recovery_mode`, or `storage_full` where the disk was too full to read the index.
+    pub fn require_index(&self) -> Result<(), Problem> {
+        if self.store.recovery_mode().is_some() {
+            return Err(problem_from::recovery_mode());
+        }
+        if self.jobs.is_unread() {
+            return Err(problem_from::index_unread());
+        }
+        Ok(())
+    }
+
     /// Whether the service can answer.
     pub fn readiness(&self) -> Readiness {
         let store = match self.store.health() {
-            Health::Ready => None,
-            Health::ReadOnly { why } if self.store.recovery_mode().is_some() => Some(why),
-            Health::ReadOnly { why } => Some(format!("read-only since a write failed: {why}")),
+            Health::Ready if self.jobs.is_behind() => {
+                Condition::Down("the disk has space again; what it kept from being done is being done".to_owned())
+            }
+            Health::Ready => Condition::Well,
+            Health::ReadOnly { why } if self.store.recovery_mode().is_some() => Condition::Down(why),
+            Health::ReadOnly { why } => Condition::Down(format!("read-only since a write failed: {why}")),
         };
-        let worker = (!self.jobs.is_running()).then(|| "the indexing worker is not running".to_owned());
-        let stopping = self
-            .stopping
-            .is_cancelled()
-            .then(|| "the service is shutting down".to_owned());
+        let worker = match self.jobs.is_running() {
+            true => Condition::Well,
+            false => Condition::Down("the indexing worker is not running".to_owned()),
+        };
+        let lifecycle = match self.stopping.is_cancelled() {
+            true => Condition::Down("the service is shutting down".to_owned()),
+            false => Condition::Well,
+        };
         Readiness {
-            checks: vec![("store", store), ("worker", worker), ("lifecycle", stopping)],
+            checks: vec![
+                ("store", store),
+                ("worker", worker),
+                ("lifecycle", lifecycle),
+                ("integrity", integrity(&self.store.damage())),
+            ],
         }
     }
+}
+
+/// Whether what is stored is what was stored. Damage keeps nothing else from working.
+fn integrity(damage: &Damage) -> Condition {
+    if damage.is_empty() {
+        return Condition::Well;
+    }
+    let mut found = Vec::new();
+    if !damage.originals.is_empty() {
+        found.push(format!(
+            "{} uploaded files are damaged or gone; upload them again",
+            damage.originals.len()
+        ));
+    }
+    if !damage.records.is_empty() {
+        found.push(format!(
+            "{} records are damaged; a restart rebuilds them",
+            damage.records.len()
+        ));
+    }
+    Condition::Degraded(format!("{}; the log names each", found.join("; ")))
 }

@@ -7,7 +7,7 @@ use crate::mesh::{self, Companion, Format, Limits, Source, TriangleSoup};
 use crate::model::{ContentHash, FailedShape, Shape};
 use crate::parameters::Parameters;
 use crate::pipeline::{Description, PipelineError, StageSpan, describe_shape};
-use crate::store::Store;
+use crate::store::{OriginalDamage, Store, StoreError};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -154,7 +154,7 @@ impl Describer<'_> {
         let load = |content| {
             self.store
                 .original(content)
-                .map_err(|e| Failure::new("file_unreadable", e.to_string()))
+                .map_err(|e| Failure::new(original_failure(&e), e.to_string()))
         };
         let bytes = load(shape.content)?;
         let companions = shape
@@ -191,6 +191,19 @@ impl Describer<'_> {
                 })
             })
             .collect()
+    }
+}
+
+/// The stable name of a failure to read a stored file.
+fn original_failure(error: &StoreError) -> &'static str {
+    match error {
+        StoreError::Original {
+            damage: OriginalDamage::Missing,
+            ..
+        } => "original_missing",
+        StoreError::Original { .. } => "original_damaged",
+        StoreError::Denied { .. } => "storage_denied",
+        _ => "file_unreadable",
     }
 }
 

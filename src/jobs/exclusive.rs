@@ -46,7 +46,7 @@ impl Jobs {
             let Some(job) = self.inner.state().unwritten.last().cloned() else {
                 return Ok(());
             };
-            self.inner.store.put_job(&job, true)?;
+            self.inner.store.put_job(&job)?;
             self.inner.state().unwritten.retain(|other| other.id != job.id);
         }
     }

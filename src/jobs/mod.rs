@@ -4,6 +4,7 @@
 //! when the process died is queued again at the next start; one that was running at shutdown goes back to the queue.
 
 mod baselines;
+mod behind;
 mod describe;
 pub mod error;
 mod exclusive;
@@ -82,6 +83,8 @@ struct State {
     channels: HashMap<JobId, watch::Sender<Job>>,
     /// Jobs that have ended without the store taking it.
     unwritten: Vec<Job>,
+    /// What a start could not do because the disk was full.
+    behind: behind::Behind,
     /// Whether jobs are refused because the store as a whole is being changed.
     paused: bool,
     stopping: bool,
@@ -161,7 +164,7 @@ impl Inner {
 impl Jobs {
     /// Loads the live index, queues interrupted jobs again and starts the worker. An index that was lost, or cannot be
     /// loaded, is queued to be learnt again; queries find it empty until then. In recovery mode nothing is loaded and
-    /// nothing runs.
+    /// nothing runs. What a full disk keeps from being done, [`Jobs::catch_up`] does later.
     ///
     /// # Errors
     /// [`JobError::Store`] where the jobs cannot be read, [`JobError::NoWorker`] where no thread can be started.
@@ -174,15 +177,10 @@ impl Jobs {
             .build()
             .map_err(|e| no_worker(e.to_string()))?;
         let idle = store.recovery_mode().is_some();
-        let (live, lost) = if idle {
-            (live::empty(&store), false)
-        } else {
-            live::load(&store)?
-        };
         let inner = Arc::new(Inner {
+            live: ArcSwap::from_pointee(live::empty(&store)),
             store,
             options,
-            live: ArcSwap::from_pointee(live),
             pool,
             state: Mutex::default(),
             changed: Condvar::new(),
@@ -190,7 +188,7 @@ impl Jobs {
             worker: Mutex::default(),
         });
         if !idle {
-            worker::requeue_interrupted(&inner)?;
+            inner.read_or_put_off()?;
         }
         let for_worker = Arc::clone(&inner);
         let worker = std::thread::Builder::new()
@@ -202,13 +200,7 @@ impl Jobs {
             _last: Arc::new(StopOnDrop(Arc::clone(&inner))),
             inner,
         };
-        if lost && jobs.queue_depth() == 0 {
-            tracing::warn!("the index has to be learnt again; a reindex is queued");
-            jobs.enqueue(JobKind::Reindex {
-                scope: crate::model::ReindexScope::Stale,
-                parameters: None,
-            })?;
-        }
+        jobs.relearn_where_lost()?;
         Ok(jobs)
     }
 
@@ -300,7 +292,7 @@ impl Jobs {
         }
         job.state = JobState::Canceled;
         job.finished_at = Some(Timestamp::now());
-        self.inner.store.put_job(&job, true)?;
+        self.inner.store.put_job(&job)?;
         state.waiting.retain(|waiting| *waiting != id);
         if let Some(channel) = state.channels.remove(&id) {
             channel.send_replace(job.clone());

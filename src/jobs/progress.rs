@@ -70,7 +70,7 @@ impl Progress {
         }
         *written = Instant::now();
         let job = self.channel.borrow().clone();
-        if let Err(error) = self.store.put_job(&job, false) {
+        if let Err(error) = self.store.put_progress(&job) {
             tracing::warn!(%error, job = %job.id, "progress was not written");
         }
     }

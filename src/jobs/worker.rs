@@ -6,7 +6,7 @@ use super::reindex::{Outcome, Reindex, reindex};
 use super::{Inner, JobError, Running};
 use crate::cancel::Cancel;
 use crate::model::{Job, JobFailure, JobId, JobKind, JobState};
-use crate::store::Health;
+use crate::store::{Health, StoreError};
 use jiff::Timestamp;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, PoisonError};
@@ -21,31 +21,49 @@ const LOOK_AGAIN: Duration = Duration::from_millis(200);
 
 /// Puts the jobs a former process left unfinished back into the queue.
 pub(super) fn requeue_interrupted(inner: &Inner) -> Result<(), JobError> {
-    let mut state = inner.state();
+    let mut again = Vec::new();
+    let mut unwritten = Vec::new();
     for mut job in inner.store.unfinished_jobs()? {
-        if job.state == JobState::Processing {
-            if job.attempts >= MAX_ATTEMPTS {
-                job.state = JobState::Failed;
-                job.finished_at = Some(Timestamp::now());
-                job.failure = Some(JobFailure {
-                    code: "crashed_repeatedly".to_owned(),
-                    detail: format!(
-                        "the process ended {} times while working on this job",
-                        job.attempts
-                    ),
-                });
-                inner.store.put_job(&job, true)?;
-                continue;
+        if job.state == JobState::Processing && job.attempts >= MAX_ATTEMPTS {
+            job.state = JobState::Failed;
+            job.finished_at = Some(Timestamp::now());
+            job.failure = Some(JobFailure {
+                code: "crashed_repeatedly".to_owned(),
+                detail: format!(
+                    "the process ended {} times while working on this job",
+                    job.attempts
+                ),
+            });
+            if !written_or_full(inner.store.put_job(&job))? {
+                unwritten.push(job);
             }
+            continue;
+        }
+        if job.state == JobState::Processing {
             job.state = JobState::Enqueued;
             job.steps.clear();
-            inner.store.put_job(&job, true)?;
+            // Not written on a full disk, the next start finds it as it was, and does the same.
+            written_or_full(inner.store.put_job(&job))?;
         }
+        again.push(job);
+    }
+    let mut state = inner.state();
+    state.unwritten.extend(unwritten);
+    for job in again {
         state.waiting.push_back(job.id);
         state.channels.insert(job.id, watch::Sender::new(job));
     }
     inner.count(&state);
     Ok(())
+}
+
+/// Whether a write was taken; `false` where the disk is full.
+fn written_or_full(done: Result<(), StoreError>) -> Result<bool, StoreError> {
+    match done {
+        Ok(()) => Ok(true),
+        Err(StoreError::Full { .. }) => Ok(false),
+        Err(other) => Err(other),
+    }
 }
 
 /// The thread's body: until it is told to stop.
@@ -120,7 +138,7 @@ fn work(inner: &Inner, channel: &watch::Sender<Job>, cancel: &Cancel) -> Result<
     });
     let job = channel.borrow().clone();
     // Durable before the work begins, so that a job that brings the process down is counted.
-    inner.store.put_job(&job, true)?;
+    inner.store.put_job(&job)?;
     let JobKind::Reindex { scope, parameters } = &job.kind;
     let progress = Progress::new(inner.store.clone(), channel.clone());
     let request = Reindex {
@@ -168,7 +186,7 @@ fn finish(inner: &Inner, id: JobId, channel: &watch::Sender<Job>, ended: Result<
     }
     if let Err(error) = inner
         .store
-        .put_job(&job, true)
+        .put_job(&job)
         .and_then(|()| inner.store.forget_old_jobs())
     {
         tracing::error!(%error, job = %id, "the end of a job was not written");

@@ -134,7 +134,7 @@ impl Store {
         let name = format!("model-{}", &blake3::hash(&bytes).to_hex()[..32]);
         let mut batch = Batch::default();
         put(&mut batch, keys::baseline(&name), &record)?;
-        self.inner.commit(&batch, true)?;
+        self.inner.commit(&batch)?;
         Ok(name)
     }
 
@@ -160,7 +160,7 @@ impl Store {
         let mut batch = Batch::default();
         let key = keys::baseline(&class_key(class, model));
         put(&mut batch, key, &ShapesRecord(shapes))?;
-        self.inner.commit(&batch, true)
+        self.inner.commit(&batch)
     }
 
     /// What a class's shapes are kept as under a model; `None` where that was not written.

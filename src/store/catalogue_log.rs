@@ -50,7 +50,7 @@ pub fn read(
     let file = match File::open(path) {
         Ok(file) => file,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(scan),
-        Err(error) => return Err(StoreError::io("open the catalogue log", &error)),
+        Err(error) => return Err(StoreError::io(format!("open {}", path.display()), &error)),
     };
     let mut reader = BufReader::with_capacity(1 << 16, file);
     let (mut line, mut number, mut at) = (Vec::new(), 0, 0_u64);
@@ -58,7 +58,7 @@ pub fn read(
         line.clear();
         let length = reader
             .read_until(b'\n', &mut line)
-            .map_err(|e| StoreError::io("read the catalogue log", &e))?;
+            .map_err(|e| StoreError::io(format!("read {}", path.display()), &e))?;
         if length == 0 {
             break;
         }
@@ -109,7 +109,8 @@ fn format(sequence: u64, event: &Event) -> Result<Vec<u8>, StoreError> {
 /// The open log.
 pub struct CatalogueLog {
     path: PathBuf,
-    file: File,
+    /// `None` where nothing may be written.
+    file: Option<File>,
     length: u64,
 }
 
@@ -127,7 +128,7 @@ impl CatalogueLog {
     /// # Errors
     /// A failure of the file system.
     pub fn open(path: &Path, good_length: u64) -> Result<Self, StoreError> {
-        let fail = |e: std::io::Error| StoreError::io("open the catalogue log", &e);
+        let fail = |e: std::io::Error| StoreError::io(format!("open {}", path.display()), &e);
         let file = OpenOptions::new()
             .create(true)
             .append(true)
@@ -142,9 +143,18 @@ impl CatalogueLog {
         }
         Ok(Self {
             path: path.to_owned(),
-            file,
+            file: Some(file),
             length: good_length,
         })
+    }
+
+    /// A log that takes no events, of a store that takes no writes.
+    pub fn closed(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            file: None,
+            length: 0,
+        }
     }
 
     /// Appends an event and waits until it is on the disk.
@@ -156,16 +166,25 @@ impl CatalogueLog {
             error,
             in_doubt: false,
         })?;
-        if let Err(error) = self.file.write_all(&line) {
-            let undone = self.file.set_len(self.length).is_ok();
+        let at = self.path.display();
+        let Some(file) = &mut self.file else {
             return Err(AppendError {
-                error: StoreError::io("append to the catalogue log", &error),
+                error: StoreError::ReadOnly {
+                    why: format!("{at} is not open for writing"),
+                },
+                in_doubt: false,
+            });
+        };
+        if let Err(error) = file.write_all(&line) {
+            let undone = file.set_len(self.length).is_ok();
+            return Err(AppendError {
+                error: StoreError::io(format!("append to {at}"), &error),
                 in_doubt: !undone,
             });
         }
         // After a failed fsync nobody knows what is on the disk, and trying again may report success wrongly.
-        self.file.sync_data().map_err(|error| AppendError {
-            error: StoreError::io("sync the catalogue log", &error),
+        file.sync_data().map_err(|error| AppendError {
+            error: StoreError::io(format!("sync {at}"), &error),
             in_doubt: true,
         })?;
         self.length += line.len() as u64;
@@ -174,11 +193,8 @@ impl CatalogueLog {
 
     /// Takes back the event appended last, whose line began at `length`. Says whether it is gone for good.
     pub fn take_back(&mut self, length: u64) -> bool {
-        let gone = self
-            .file
-            .set_len(length)
-            .and_then(|()| self.file.sync_data())
-            .is_ok();
+        let cut = |file: &File| file.set_len(length).and_then(|()| file.sync_data());
+        let gone = self.file.as_ref().is_some_and(|file| cut(file).is_ok());
         if gone {
             self.length = length;
         }
@@ -195,13 +211,14 @@ impl CatalogueLog {
     /// # Errors
     /// A failure of the file system; the old log is in place then.
     pub fn rewrite(&mut self, first: u64, events: &[Event]) -> Result<(), StoreError> {
-        let fail = |e: std::io::Error| StoreError::io("rewrite the catalogue log", &e);
+        let fail = |e: std::io::Error| StoreError::io(format!("rewrite {}", self.path.display()), &e);
         let mut text = Vec::new();
         for (sequence, event) in (first..).zip(events) {
             text.extend_from_slice(&format(sequence, event)?);
         }
         files::write_durably(&self.path, &text)?;
-        self.file = OpenOptions::new().append(true).open(&self.path).map_err(fail)?;
+        let file = OpenOptions::new().append(true).open(&self.path).map_err(fail)?;
+        self.file = Some(file);
         self.length = text.len() as u64;
         Ok(())
     }

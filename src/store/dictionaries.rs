@@ -116,7 +116,7 @@ impl Store {
         let size = bytes.len() as u64;
         let mut batch = Batch::default();
         batch.put(key, bytes);
-        self.inner.commit(&batch, true)?;
+        self.inner.commit(&batch)?;
         Ok(size)
     }
 

@@ -1,6 +1,7 @@
 //! Why the store could not do what it was asked.
 
-use crate::model::{ClassId, ClassName, JobId, KeyId, KeyName, ShapeId, SnapshotId};
+use super::originals::OriginalDamage;
+use crate::model::{ClassId, ClassName, ContentHash, JobId, KeyId, KeyName, ShapeId, SnapshotId};
 use std::path::PathBuf;
 
 /// The store's errors. Those up to [`StoreError::BadSnapshot`] are the caller's; the others are the machine's.
@@ -93,6 +94,24 @@ pub enum StoreError {
         /// What is wrong with it.
         detail: String,
     },
+    /// A shape's uploaded file is gone or no longer what was uploaded.
+    #[error("the stored file {content} {damage}; upload the same file again to heal it")]
+    Original {
+        /// The hash of the contents it had, and its name.
+        content: ContentHash,
+        /// What is wrong with it.
+        damage: OriginalDamage,
+    },
+    /// The system refuses this process the right to use a file, or the file system is mounted read-only.
+    #[error(
+        "{what}: {detail}; give the user that runs shapelex the right to read and write it, and mount it writable"
+    )]
+    Denied {
+        /// What was being done, with the path.
+        what: String,
+        /// The refusal.
+        detail: String,
+    },
     /// The data directory is of a format this build does not know.
     #[error("data directory has format {found}, this shapelex reads up to {supported}; {hint}")]
     NewerFormat {
@@ -122,13 +141,17 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    /// Wraps a file system error, telling a full disk apart.
+    /// Wraps a file system error, telling a full disk and a missing right apart.
     pub(crate) fn io(what: impl Into<String>, error: &std::io::Error) -> Self {
         let what = what.into();
         match error.kind() {
             std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
                 Self::Full { detail: what }
             }
+            std::io::ErrorKind::PermissionDenied | std::io::ErrorKind::ReadOnlyFilesystem => Self::Denied {
+                what,
+                detail: error.to_string(),
+            },
             _ => Self::Io {
                 what,
                 detail: error.to_string(),

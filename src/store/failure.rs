@@ -6,6 +6,7 @@
 
 use super::{StoreError, files};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 const RESERVE: &str = "reserve";
@@ -20,6 +21,8 @@ pub(super) struct Failure {
     first: Mutex<Option<StoreError>>,
     /// Held while the reserve is being taken, which fills the disk for a moment, and by reads that need the space.
     space: Mutex<()>,
+    /// The number of the last change of the catalogue that was acknowledged.
+    acknowledged: AtomicU64,
 }
 
 impl Failure {
@@ -29,7 +32,18 @@ impl Failure {
             reserve: data.join(RESERVE),
             first: Mutex::new(None),
             space: Mutex::new(()),
+            acknowledged: AtomicU64::new(0),
         }
+    }
+
+    /// The number of the last change of the catalogue that was acknowledged.
+    pub fn acknowledged(&self) -> u64 {
+        self.acknowledged.load(Ordering::Acquire)
+    }
+
+    /// A change of the catalogue is in the log and in the records.
+    pub fn acknowledge(&self, sequence: u64) {
+        self.acknowledged.store(sequence, Ordering::Release);
     }
 
     fn lock(&self) -> MutexGuard<'_, Option<StoreError>> {
@@ -87,13 +101,23 @@ impl Failure {
         if self.has_reserve() {
             return Ok(());
         }
-        if free_bytes(&self.reserve).is_some_and(|free| free < RESERVE_BYTES as u64 + MARGIN_BYTES) {
-            return Err(StoreError::Full {
-                detail: "take the reserve of disk space".to_owned(),
-            });
-        }
+        require_space(self.directory(), "take the reserve of disk space")?;
         // Not zeros, which a file system may keep without taking space.
         files::write_durably(&self.reserve, &vec![0x5a; RESERVE_BYTES])
+    }
+
+    fn directory(&self) -> &Path {
+        self.reserve.parent().unwrap_or(Path::new("."))
+    }
+
+    /// Bytes the file system of the data directory has free for this process; `None` where the system does not say.
+    pub fn disk_free(&self) -> Option<u64> {
+        free_bytes(self.directory())
+    }
+
+    /// Whether the disk has so little space that the engine's failure to open may come from that.
+    pub fn is_disk_full(&self) -> bool {
+        self.disk_free().is_some_and(|free| free < MARGIN_BYTES)
     }
 
     /// Whether the reserve is there whole.
@@ -109,10 +133,21 @@ impl Failure {
     }
 }
 
-/// What the file system of a file's directory has free for us. A quota may leave less.
+/// Refuses where a directory's file system has no space for the reserve and a margin.
+pub(super) fn require_space(directory: &Path, what: &str) -> Result<(), StoreError> {
+    let needed = RESERVE_BYTES as u64 + MARGIN_BYTES;
+    match free_bytes(directory) {
+        Some(free) if free < needed => Err(StoreError::Full {
+            detail: format!("{what}: {} KiB are free, {} are needed", free >> 10, needed >> 10),
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// What the file system of a directory has free for this process. A quota may leave less.
 #[cfg(target_os = "linux")]
-fn free_bytes(file: &Path) -> Option<u64> {
-    let system = rustix::fs::statvfs(file.parent()?).ok()?;
+fn free_bytes(directory: &Path) -> Option<u64> {
+    let system = rustix::fs::statvfs(directory).ok()?;
     Some(system.f_bavail.saturating_mul(system.f_frsize))
 }
 

@@ -95,7 +95,7 @@ impl Store {
             }
         }
         if !batch.is_empty() {
-            self.inner.commit(&batch, true)?;
+            self.inner.commit(&batch)?;
         }
         Ok(batch.writes.len())
     }

@@ -86,7 +86,7 @@ impl Store {
             };
             put(&mut batch, keys::idempotency(key), &remembered)?;
         }
-        self.inner.commit(&batch, true)
+        self.inner.commit(&batch)
     }
 }
 

@@ -10,13 +10,20 @@ const REMEMBERED: usize = 1000;
 
 impl Store {
     /// Writes a job. A job that is not finished is in the queue, a finished one is not; both change together.
-    /// Progress need not be `durable`: losing it in a crash loses nothing that was acknowledged.
     ///
     /// # Errors
     /// [`StoreError::ReadOnly`], or the write's failure.
-    pub fn put_job(&self, job: &Job, durable: bool) -> Result<(), StoreError> {
-        let batch = self.job_batch(job)?;
-        self.inner.commit(&batch, durable)
+    pub fn put_job(&self, job: &Job) -> Result<(), StoreError> {
+        self.inner.commit(&self.job_batch(job)?)
+    }
+
+    /// Writes how far a job is, without waiting for the disk: losing that in a crash loses nothing that was
+    /// acknowledged.
+    ///
+    /// # Errors
+    /// As [`Store::put_job`].
+    pub fn put_progress(&self, job: &Job) -> Result<(), StoreError> {
+        self.inner.commit_lazily(&self.job_batch(job)?)
     }
 
     /// The writes that keep a job.
@@ -78,7 +85,7 @@ impl Store {
         }
         let forgotten = batch.writes.len();
         if forgotten > 0 {
-            self.inner.commit(&batch, false)?;
+            self.inner.commit_lazily(&batch)?;
         }
         Ok(forgotten)
     }

@@ -1,17 +1,14 @@
 //! A backend in memory that fails where a test wants it to and forgets what was never flushed.
 
 use super::StoreError;
-use super::backend::{Backend, Batch, Entry, prefix_end};
-use std::collections::BTreeMap;
-use std::ops::Bound;
+use super::backend::{Backend, Batch, Entry};
+use super::ordered_map::OrderedMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-
-type Map = BTreeMap<Vec<u8>, Vec<u8>>;
 
 #[derive(Default)]
 struct State {
-    current: Map,
-    durable: Map,
+    current: OrderedMap,
+    durable: OrderedMap,
     /// Batches applied since the last flush, oldest first.
     pending: Vec<Batch>,
     writes: u64,
@@ -75,7 +72,7 @@ impl MemoryBackend {
         let state = self.state();
         let mut map = state.durable.clone();
         for batch in state.pending.iter().take(survivors) {
-            apply(&mut map, batch);
+            map.apply(batch);
         }
         Self(Mutex::new(State {
             current: map.clone(),
@@ -87,7 +84,7 @@ impl MemoryBackend {
     /// Changes one byte of a key's value, as a disk that rots would.
     pub fn corrupt(&self, key: &[u8], at: usize) {
         let mut state = self.state();
-        if let Some(value) = state.current.get_mut(key) {
+        if let Some(value) = state.current.0.get_mut(key) {
             let at = at % value.len().max(1);
             value[at] ^= 0x20;
         }
@@ -95,16 +92,7 @@ impl MemoryBackend {
 
     /// All keys.
     pub fn keys(&self) -> Vec<Vec<u8>> {
-        self.state().current.keys().cloned().collect()
-    }
-}
-
-fn apply(map: &mut Map, batch: &Batch) {
-    for (key, value) in &batch.writes {
-        match value {
-            Some(value) => map.insert(key.clone(), value.clone()),
-            None => map.remove(key),
-        };
+        self.state().current.0.keys().cloned().collect()
     }
 }
 
@@ -127,32 +115,13 @@ impl State {
     }
 }
 
-fn range(map: &Map, low: Bound<&[u8]>, high: Bound<&[u8]>) -> impl DoubleEndedIterator<Item = Entry> {
-    let empty = match (low, high) {
-        (Bound::Included(l) | Bound::Excluded(l), Bound::Excluded(h)) => l >= h,
-        _ => false,
-    };
-    let bounds = if empty {
-        (Bound::Included(&[][..]), Bound::Excluded(&[][..]))
-    } else {
-        (low, high)
-    };
-    map.range::<[u8], _>(bounds).map(|(k, v)| (k.clone(), v.clone()))
-}
-
 impl Backend for MemoryBackend {
     fn get(&self, key: &[u8]) -> Result<Option<Vec<u8>>, StoreError> {
-        Ok(self.state().current.get(key).cloned())
+        Ok(self.state().current.get(key))
     }
 
     fn scan(&self, prefix: &[u8], after: Option<&[u8]>, limit: usize) -> Result<Vec<Entry>, StoreError> {
-        let end = prefix_end(prefix);
-        let high = end.as_deref().map_or(Bound::Unbounded, Bound::Excluded);
-        let low = match after {
-            Some(key) if key >= prefix => Bound::Excluded(key),
-            _ => Bound::Included(prefix),
-        };
-        Ok(range(&self.state().current, low, high).take(limit).collect())
+        Ok(self.state().current.scan(prefix, after, limit))
     }
 
     fn scan_back(
@@ -161,22 +130,13 @@ impl Backend for MemoryBackend {
         before: Option<&[u8]>,
         limit: usize,
     ) -> Result<Vec<Entry>, StoreError> {
-        let end = prefix_end(prefix);
-        let high = match (before, end.as_deref()) {
-            (Some(key), Some(end)) => Bound::Excluded(key.min(end)),
-            (Some(key), None) | (None, Some(key)) => Bound::Excluded(key),
-            (None, None) => Bound::Unbounded,
-        };
-        Ok(range(&self.state().current, Bound::Included(prefix), high)
-            .rev()
-            .take(limit)
-            .collect())
+        Ok(self.state().current.scan_back(prefix, before, limit))
     }
 
     fn apply(&self, batch: &Batch) -> Result<(), StoreError> {
         let mut state = self.state();
         state.write()?;
-        apply(&mut state.current, batch);
+        state.current.apply(batch);
         state.pending.push(batch.clone());
         Ok(())
     }
@@ -188,6 +148,7 @@ impl Backend for MemoryBackend {
         state.durable = state.current.clone();
         Ok(())
     }
+
     fn reopen(&self, meanwhile: &mut dyn FnMut() -> Result<(), StoreError>) -> Result<(), StoreError> {
         let mut state = self.state();
         let done = meanwhile();
@@ -195,7 +156,7 @@ impl Backend for MemoryBackend {
         let pending = std::mem::take(&mut state.pending);
         let mut map = state.durable.clone();
         for batch in pending.iter().take(survivors) {
-            apply(&mut map, batch);
+            map.apply(batch);
         }
         state.current.clone_from(&map);
         state.durable = map;

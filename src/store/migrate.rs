@@ -49,19 +49,34 @@ fn refuse_newer(found: u32) -> Result<(), StoreError> {
     Ok(())
 }
 
-/// Reads `DATA/format`; `None` where the directory is new.
-pub(super) fn check_format(data: &Path) -> Result<Option<u32>, StoreError> {
-    let text = match std::fs::read_to_string(data.join("format")) {
+/// What `DATA/format` says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Format {
+    /// The format of this build.
+    Current,
+    /// An older one.
+    Older,
+    /// Nothing: the directory is new, or the file was lost or cut off. The records know their own format.
+    Unknown,
+}
+
+/// Reads `DATA/format`. A file that holds no number, as a power cut may leave it, is as good as none.
+pub(super) fn check_format(data: &Path) -> Result<Format, StoreError> {
+    let path = data.join("format");
+    let text = match std::fs::read(&path) {
         Ok(text) => text,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(StoreError::io("read the data directory's format", &error)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Format::Unknown),
+        Err(error) => return Err(StoreError::io(format!("read {}", path.display()), &error)),
     };
-    let found = text
-        .trim()
-        .parse()
-        .map_err(|_| StoreError::damaged("the file 'format' of the data directory", "it holds no number"))?;
+    let Some(found) = std::str::from_utf8(&text).ok().and_then(|t| t.trim().parse().ok()) else {
+        tracing::warn!(
+            file = %path.display(),
+            "the file holds no format number and is written anew; the records know their format"
+        );
+        return Ok(Format::Unknown);
+    };
     refuse_newer(found)?;
-    Ok(Some(found))
+    Ok(if found == FORMAT { Format::Current } else { Format::Older })
 }
 
 /// Writes `DATA/format`, before any migration of that format changes a record.

@@ -14,6 +14,7 @@ pub mod backend;
 mod baselines;
 mod catalogue;
 mod catalogue_log;
+mod damage;
 mod dictionaries;
 pub mod error;
 mod event;
@@ -30,26 +31,33 @@ mod keys;
 pub mod memory_backend;
 mod migrate;
 mod open;
+mod ordered_map;
 mod originals;
 mod payload;
 mod payload_jobs;
 mod rebuild;
 pub mod record;
+mod records;
 mod recover;
+mod scrub;
 mod signatures;
 mod sled_backend;
 pub mod snapshot;
+mod standby;
 mod usage;
 
 pub use api_keys::MAX_KEYS;
 pub use backend::Backend;
 pub use catalogue::AddedShape;
+pub use damage::Damage;
 pub use dictionaries::Dictionaries;
 pub use error::StoreError;
 pub use garbage::Garbage;
 pub use idempotency::Remembered;
 pub use memory_backend::MemoryBackend;
 pub use migrate::FORMAT;
+pub use originals::{CheckedFile, OriginalDamage};
+pub use scrub::ScrubReport;
 pub use usage::Usage;
 
 use backend::Batch;
@@ -119,10 +127,12 @@ struct Inner {
     pinned: Mutex<snapshot::Pinned>,
     /// Held by whoever makes or restores a snapshot: one at a time.
     snapshots: Mutex<()>,
+    /// What was found damaged and is not healed yet.
+    damage: Mutex<Damage>,
     failure: Arc<Failure>,
     recovery: Vec<String>,
-    /// Released when the last clone is dropped.
-    _lock: File,
+    /// Released when the last clone is dropped. `None` where nothing may be written.
+    _lock: Option<File>,
 }
 
 struct Writer {
@@ -146,16 +156,18 @@ impl Inner {
         self.failure.remember(error)
     }
 
-    /// Applies a batch, and waits for the disk where it must be durable.
-    fn commit(&self, batch: &Batch, durable: bool) -> Result<(), StoreError> {
+    /// Applies a batch and waits until it is on the disk.
+    fn commit(&self, batch: &Batch) -> Result<(), StoreError> {
+        self.commit_lazily(batch)?;
+        self.backend.flush().map_err(|e| self.fail(e))?;
+        // A read that met a full disk in between has opened the engine anew, maybe without the batch.
+        self.writable()
+    }
+
+    /// Applies a batch; a crash before the next flush may lose it.
+    fn commit_lazily(&self, batch: &Batch) -> Result<(), StoreError> {
         self.writable()?;
-        self.backend.apply(batch).map_err(|e| self.fail(e))?;
-        if durable {
-            self.backend.flush().map_err(|e| self.fail(e))?;
-            // A read that met a full disk in between has opened the engine anew, maybe without the batch.
-            self.writable()?;
-        }
-        Ok(())
+        self.backend.apply(batch).map_err(|e| self.fail(e))
     }
 
     /// Makes an event happen: into the log first, then into the records, with more writes of the caller's in the same
@@ -175,7 +187,7 @@ impl Inner {
                 append.error
             });
         }
-        if let Err(error) = self.commit(&batch, true) {
+        if let Err(error) = self.commit(&batch) {
             // A full disk refuses and forgets. Where the records took the change after all, they are believed.
             if matches!(error, StoreError::Full { .. }) && !writer.log.take_back(length) {
                 tracing::warn!(
@@ -185,6 +197,7 @@ impl Inner {
             return Err(error);
         }
         writer.sequence = sequence;
+        self.failure.acknowledge(sequence);
         Ok(())
     }
 }
@@ -220,6 +233,16 @@ impl Store {
         }
     }
 
+    /// Whether the store is read-only because the disk is full, which [`Store::recover`] looks after.
+    pub fn waits_for_space(&self) -> bool {
+        matches!(self.inner.failure.get(), Some(StoreError::Full { .. }))
+    }
+
+    /// Bytes the file system of the data directory has free; `None` where the system does not say.
+    pub fn disk_free(&self) -> Option<u64> {
+        self.inner.failure.disk_free()
+    }
+
     /// What had to be recovered when the store was opened, a sentence each; empty where nothing had to be.
     pub fn recovery(&self) -> &[String] {
         &self.inner.recovery
@@ -230,6 +253,6 @@ impl Store {
     /// # Errors
     /// [`StoreError::ReadOnly`], or the flush's failure.
     pub fn flush(&self) -> Result<(), StoreError> {
-        self.inner.commit(&Batch::default(), true)
+        self.inner.commit(&Batch::default())
     }
 }

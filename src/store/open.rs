@@ -3,8 +3,11 @@
 use super::backend::{Backend, Batch};
 use super::catalogue_log::{self, CatalogueLog, LogScan};
 use super::event::{self, Event, get, put, shapes_of};
-use super::failure::Failure;
+use super::failure::{Failure, require_space};
+use super::migrate::Format;
 use super::payload::Number;
+use super::records::Records;
+use super::standby::Standby;
 use super::{Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, rebuild, snapshot};
 use crate::model::Class;
 use std::fs::{File, TryLockError};
@@ -12,30 +15,58 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, RwLock};
 
 pub(super) const LOG: &str = "catalogue.log";
+/// Where records are, the second one for a moment during a rebuild.
+const RECORDS: [&str; 2] = ["sled", "sled.rebuilt"];
 
 /// Replayed events between two flushes.
 const REPLAY_FLUSH: u64 = 256;
 
 impl Store {
     /// Opens or creates a data directory. Damaged records are rebuilt from the catalogue log and the stored files,
-    /// the damaged ones kept aside; [`Store::recovery`] tells what was done.
+    /// the damaged ones kept aside; [`Store::recovery`] tells what was done. On a full disk the store opens read-only,
+    /// and [`Store::recover`] makes it writable once there is space.
     ///
     /// # Errors
     /// [`StoreError::Locked`], [`StoreError::NewerFormat`], [`StoreError::Damaged`] where there is nothing to rebuild
-    /// from, or a failure of the file system.
+    /// from, [`StoreError::Denied`] where the directory may not be written, [`StoreError::Full`] where a new one cannot
+    /// be made, or a failure of the file system.
     pub fn open(path: &Path, options: &StoreOptions) -> Result<Self, StoreError> {
-        let lock = prepare(path)?;
-        let mut recovery = Vec::new();
-        // A disk that is full still opens, if it can: with what the reserve held.
         let failure = Arc::new(Failure::none(path));
-        failure.give_up_reserve();
-        let backend = rebuild::open_records(path, options, &failure, &mut recovery)?;
-        let store = finish(path, Arc::new(backend), lock, failure, recovery)?;
+        let lock = prepare(path, &failure)?;
+        refuse_to_forget(path)?;
+        let mut recovery = Vec::new();
+        let records = Records::open(path, options, &failure, &mut recovery)?;
+        let log = path.join(LOG);
+        let settled = match failure.get() {
+            Some(full) => Err(full),
+            None => settle(path, &records, &mut recovery),
+        };
+        let writer = match settled {
+            Ok(writer) => writer,
+            // The records stay as they are until there is space; what the log has beyond them was never answered.
+            Err(full @ StoreError::Full { .. }) => {
+                failure.remember(full);
+                let sequence = sequence(&records)?;
+                Writer::closed(&log, sequence)
+            }
+            Err(other) => return Err(other),
+        };
+        failure.acknowledge(writer.sequence);
         // Read-only until there is space, where there is none.
-        if let Err(error) = store.inner.failure.take_reserve() {
-            store.inner.fail(error);
+        if failure.get().is_none()
+            && let Err(error) = failure.take_reserve()
+        {
+            failure.remember(error);
         }
-        Ok(store)
+        Ok(Parts {
+            path,
+            backend: Arc::new(records),
+            writer,
+            lock: Some(lock),
+            failure,
+            recovery,
+        }
+        .store())
     }
 
     /// Opens a data directory with records in a backend of the caller's.
@@ -43,17 +74,98 @@ impl Store {
     /// # Errors
     /// As for [`Store::open`]; damaged records are not rebuilt but reported.
     pub fn open_with(path: &Path, backend: Arc<dyn Backend>) -> Result<Self, StoreError> {
-        let lock = prepare(path)?;
+        let failure = Arc::new(Failure::none(path));
+        let lock = prepare(path, &failure)?;
         rebuild::verify(&*backend)?;
-        finish(path, backend, lock, Arc::new(Failure::none(path)), Vec::new())
+        let mut recovery = Vec::new();
+        let writer = settle(path, &*backend, &mut recovery)?;
+        failure.acknowledge(writer.sequence);
+        Ok(Parts {
+            path,
+            backend,
+            writer,
+            lock: Some(lock),
+            failure,
+            recovery,
+        }
+        .store())
+    }
+
+    /// Opens a data directory that cannot be written, in [recovery mode](Store::recovery_mode): the catalogue as its log
+    /// has it. Nothing is written and no lock is taken.
+    ///
+    /// # Errors
+    /// `why`, what keeps the directory from being written, where its log cannot be read either.
+    pub fn open_read_only(path: &Path, why: StoreError) -> Result<Self, StoreError> {
+        let log = snapshot::log_in_force(path);
+        let reason = StoreError::RecoveryMode {
+            why: format!("the data directory cannot be written ({why})"),
+        };
+        let standby = Standby::from_log(&log, u64::MAX, reason.clone()).map_err(|error| {
+            tracing::error!(%error, "the catalogue log cannot be read either");
+            why
+        })?;
+        let failure = Arc::new(Failure::none(path));
+        failure.replace(Some(reason));
+        Ok(Parts {
+            path,
+            backend: Arc::new(standby),
+            writer: Writer::closed(&log, 0),
+            lock: None,
+            failure,
+            recovery: Vec::new(),
+        }
+        .store())
+    }
+}
+
+/// What a store is made of.
+struct Parts<'a> {
+    path: &'a Path,
+    backend: Arc<dyn Backend>,
+    writer: Writer,
+    lock: Option<File>,
+    failure: Arc<Failure>,
+    recovery: Vec<String>,
+}
+
+impl Parts<'_> {
+    fn store(self) -> Store {
+        for line in &self.recovery {
+            tracing::warn!(line, "recovered");
+        }
+        Store {
+            inner: Arc::new(Inner {
+                path: self.path.to_owned(),
+                backend: self.backend,
+                writer: Mutex::new(self.writer),
+                files: RwLock::new(()),
+                pinned: Mutex::default(),
+                snapshots: Mutex::new(()),
+                damage: Mutex::default(),
+                failure: self.failure,
+                recovery: self.recovery,
+                _lock: self.lock,
+            }),
+        }
     }
 }
 
 /// Makes the directory, takes its lock and checks its format.
-fn prepare(path: &Path) -> Result<File, StoreError> {
+fn prepare(path: &Path, failure: &Failure) -> Result<File, StoreError> {
     let fail = |e: std::io::Error| StoreError::io(format!("open the data directory {}", path.display()), &e);
+    let has = |name: &str| path.join(name).exists();
+    let new = !RECORDS.into_iter().chain([LOG, "format"]).any(has);
+    if new {
+        // Said before anything is made, so that nothing half-made is left.
+        let place = path.ancestors().find(|p| p.is_dir()).unwrap_or(Path::new("."));
+        let what = format!("make the data directory {}; free some space and start again", path.display());
+        require_space(place, &what)?;
+    }
     std::fs::create_dir_all(path).map_err(fail)?;
-    let lock = File::create(path.join("lock")).map_err(fail)?;
+    let lock_path = path.join("lock");
+    let lock = File::create(&lock_path)
+        .map_err(|e| StoreError::io(format!("open the data directory: open {}", lock_path.display()), &e))?;
     match lock.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
@@ -63,11 +175,20 @@ fn prepare(path: &Path) -> Result<File, StoreError> {
         }
         Err(TryLockError::Error(error)) => return Err(fail(error)),
     }
+    // A disk that is full still opens, if it can: with what the reserve held.
+    failure.give_up_reserve();
     snapshot::finish_restore(path)?;
-    let format = migrate::check_format(path)?;
-    refuse_to_forget(path, format.is_some())?;
-    if format != Some(migrate::FORMAT) {
-        migrate::write_format(path)?;
+    if migrate::check_format(path)? != Format::Current {
+        match migrate::write_format(path) {
+            Err(full @ StoreError::Full { .. }) if !new => {
+                tracing::warn!(%full, "the format is written by a start with space on the disk");
+            }
+            done => done?,
+        }
+    }
+    if !RECORDS.into_iter().chain([LOG]).any(has) {
+        // Before the engine, so that a first start that is cut off leaves a log to begin again from.
+        CatalogueLog::open(&path.join(LOG), 0)?;
     }
     for entry in std::fs::read_dir(path).map_err(fail)?.flatten() {
         if entry.file_name().to_string_lossy().starts_with(".writing-") {
@@ -77,45 +198,38 @@ fn prepare(path: &Path) -> Result<File, StoreError> {
     Ok(lock)
 }
 
-/// A directory with stored files but neither records nor log has lost its catalogue. Starting empty would remove the
-/// files as unreferenced.
-fn refuse_to_forget(path: &Path, used: bool) -> Result<(), StoreError> {
+/// A directory with stored files but neither records nor a line of the log has lost its catalogue. Starting empty would
+/// remove the files as unreferenced.
+fn refuse_to_forget(path: &Path) -> Result<(), StoreError> {
     let has = |name: &str| path.join(name).exists();
-    let files = std::fs::read_dir(path.join("originals")).is_ok_and(|mut d| d.next().is_some());
-    if used && files && !has("sled") && !has("sled.rebuilt") && !has(LOG) {
+    if has_originals(path) && !RECORDS.into_iter().any(has) && is_empty(&path.join(LOG)) {
         return Err(StoreError::damaged(
             format!("the data directory {}", path.display()),
-            "there are stored files, but both 'sled' and 'catalogue.log' are gone; put one of them back, \
+            "there are stored files, but 'sled' is gone and 'catalogue.log' is gone or empty; put one of them back, \
              or move 'originals' away to start empty",
         ));
     }
     Ok(())
 }
 
-fn finish(
-    path: &Path,
-    backend: Arc<dyn Backend>,
-    lock: File,
-    failure: Arc<Failure>,
-    mut recovery: Vec<String>,
-) -> Result<Store, StoreError> {
-    let writer = settle(path, &*backend, &mut recovery)?;
-    for line in &recovery {
-        tracing::warn!(line, "recovered");
+/// Whether there are uploaded files.
+pub(super) fn has_originals(data: &Path) -> bool {
+    std::fs::read_dir(data.join("originals")).is_ok_and(|mut d| d.next().is_some())
+}
+
+/// Whether a file is missing or has no contents.
+pub(super) fn is_empty(file: &Path) -> bool {
+    std::fs::metadata(file).map_or(true, |file| file.len() == 0)
+}
+
+impl Writer {
+    /// One that takes no events; the last one's number is known all the same.
+    fn closed(log: &Path, sequence: u64) -> Self {
+        Self {
+            log: CatalogueLog::closed(log),
+            sequence,
+        }
     }
-    Ok(Store {
-        inner: Arc::new(Inner {
-            path: path.to_owned(),
-            backend,
-            writer: Mutex::new(writer),
-            files: RwLock::new(()),
-            pinned: Mutex::default(),
-            snapshots: Mutex::new(()),
-            failure,
-            recovery,
-            _lock: lock,
-        }),
-    })
 }
 
 /// Brings records and log to the same state, whatever a crash or a failed write left, and opens the log.

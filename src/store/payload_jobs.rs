@@ -133,22 +133,37 @@ struct JobV1 {
     result: Option<String>,
 }
 
+/// A state's number in records. It never changes.
+fn state_number(state: JobState) -> u8 {
+    match state {
+        JobState::Enqueued => 0,
+        JobState::Processing => 1,
+        JobState::Succeeded => 2,
+        JobState::Failed => 3,
+        JobState::Canceled => 4,
+    }
+}
+
+fn state_of(number: u8) -> Result<JobState, String> {
+    match number {
+        0 => Ok(JobState::Enqueued),
+        1 => Ok(JobState::Processing),
+        2 => Ok(JobState::Succeeded),
+        3 => Ok(JobState::Failed),
+        4 => Ok(JobState::Canceled),
+        _ => Err(format!("unknown job state {number}")),
+    }
+}
+
 impl Record for Job {
     const FAMILY: Family = Family::Job;
     const VERSION: u16 = 1;
 
     fn encode(&self) -> Result<Vec<u8>, String> {
-        let state = match self.state {
-            JobState::Enqueued => 0,
-            JobState::Processing => 1,
-            JobState::Succeeded => 2,
-            JobState::Failed => 3,
-            JobState::Canceled => 4,
-        };
         pack(&JobV1 {
             id: self.id.to_bytes(),
             kind: to_json(&self.kind)?,
-            state,
+            state: state_number(self.state),
             steps: self
                 .steps
                 .iter()
@@ -167,13 +182,10 @@ impl Record for Job {
     fn decode(version: u16, payload: &[u8]) -> Result<Self, String> {
         only(version, 1)?;
         let v: JobV1 = unpack(payload)?;
-        let state = *JobState::ALL
-            .get(usize::from(v.state))
-            .ok_or_else(|| format!("unknown job state {}", v.state))?;
         Ok(Self {
             id: JobId::from_bytes(v.id),
             kind: from_json(&v.kind)?,
-            state,
+            state: state_of(v.state)?,
             steps: v
                 .steps
                 .into_iter()
@@ -214,5 +226,13 @@ mod tests {
         let again = Generation::decode(Generation::VERSION, &new.encode().unwrap()).unwrap();
         assert_eq!(again, new);
         assert!(Generation::decode(3, &new.encode().unwrap()).is_err());
+    }
+    #[test]
+    fn every_state_of_a_job_comes_back_from_its_number() {
+        for state in JobState::ALL {
+            assert_eq!(state_of(state_number(state)), Ok(state));
+        }
+        assert_eq!(JobState::ALL.map(state_number), [0, 1, 2, 3, 4]);
+        assert!(state_of(5).is_err());
     }
 }

@@ -6,7 +6,7 @@
 use super::backend::{Backend, Batch, Entry};
 use super::event::{files_of, get};
 use super::failure::Failure;
-use super::open::{LOG, replay};
+use super::open::{LOG, has_originals, is_empty, replay};
 use super::payload::Number;
 use super::sled_backend::SledBackend;
 use super::{StoreError, StoreOptions, files, keys, migrate, record};
@@ -50,7 +50,14 @@ pub(super) fn open_records(
         Err(damage @ StoreError::Damaged { .. }) => (damage, Vec::new()),
         Err(other) => return Err(other),
     };
-    if !data.join(LOG).exists() {
+    if failure.is_disk_full() {
+        // Without space the engine fails in ways that look like damage. Looked at again once there is space.
+        return Err(StoreError::Full {
+            detail: format!("open the records ({damage})"),
+        });
+    }
+    let log = data.join(LOG);
+    if !log.exists() || (is_empty(&log) && has_originals(data)) {
         return Err(StoreError::damaged(
             format!("the data directory {}", data.display()),
             format!("{damage}, and there is no catalogue log to rebuild from; restore a backup"),

@@ -29,6 +29,7 @@ impl Store {
             .reopen(&mut || snapshot::go_on(self.path()))
             .and_then(|()| settle(self.path(), &*self.inner.backend, &mut notes));
         *writer = settled.map_err(|error| failure.remember(error))?;
+        failure.acknowledge(writer.sequence);
         // A read that met the full disk meanwhile has given the reserve up; one that meets it later says so itself.
         let _space = failure.hold_space();
         if !failure.has_reserve() {

@@ -36,6 +36,11 @@ impl SledBackend {
         })
     }
 
+    /// Whether the engine is open; it is not where opening it again failed.
+    pub fn is_open(&self) -> bool {
+        self.db.read().unwrap_or_else(PoisonError::into_inner).is_ok()
+    }
+
     fn with<T>(&self, what: &str, work: impl FnOnce(&sled::Db) -> sled::Result<T>) -> Result<T, StoreError> {
         let db = self.db.read().unwrap_or_else(PoisonError::into_inner);
         match &*db {
@@ -65,6 +70,25 @@ impl SledBackend {
     }
 }
 
+impl Drop for SledBackend {
+    /// Closing flushes, and after a failure that may fail or panic again, in whichever thread held the engine last.
+    fn drop(&mut self) {
+        let db = self.db.get_mut().unwrap_or_else(PoisonError::into_inner);
+        close(std::mem::replace(db, Err(closed())));
+    }
+}
+
+/// Closes the engine. What counts after a failure is what the next opening finds.
+fn close(db: Result<sled::Db, StoreError>) {
+    let done = caught("close the key-value store", || {
+        drop(db);
+        Ok(())
+    });
+    if let Err(error) = done {
+        tracing::warn!(%error, "the key-value store was not closed in good order");
+    }
+}
+
 /// What stands in the engine's place for as long as nothing is open; nobody sees it but after a panic.
 fn closed() -> StoreError {
     StoreError::Io {
@@ -89,7 +113,7 @@ fn open(path: &Path, cache_bytes: u64) -> Result<sled::Db, StoreError> {
             Err(error) if is_held(&error) && began.elapsed() < OPEN_WITHIN => {
                 std::thread::sleep(Duration::from_millis(20));
             }
-            Err(error) => return Err(unopened(error)),
+            Err(error) => return Err(unopened(path, error)),
         }
     }
 }
@@ -105,12 +129,12 @@ fn remove_unfinished_snapshots(path: &Path) -> Result<(), StoreError> {
     let entries = match std::fs::read_dir(path) {
         Ok(entries) => entries,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        Err(error) => return Err(StoreError::io("list the key-value store", &error)),
+        Err(error) => return Err(StoreError::io(format!("list the key-value store {}", path.display()), &error)),
     };
     for entry in entries.flatten() {
         if entry.path().extension().is_some_and(|e| e == "generating") {
             std::fs::remove_file(entry.path())
-                .map_err(|e| StoreError::io("remove an unfinished snapshot of the key-value store", &e))?;
+                .map_err(|e| StoreError::io(format!("remove {}", entry.path().display()), &e))?;
         }
     }
     Ok(())
@@ -118,7 +142,7 @@ fn remove_unfinished_snapshots(path: &Path) -> Result<(), StoreError> {
 
 /// An engine that does not open its own directory calls that a defect, an unsupported version or a short read; all
 /// are damage to us, and have a way out. What the file system refuses has none, and stays what it is.
-fn unopened(error: sled::Error) -> StoreError {
+fn unopened(path: &Path, error: sled::Error) -> StoreError {
     use std::io::ErrorKind as Kind;
     match error {
         sled::Error::Io(error)
@@ -132,7 +156,7 @@ fn unopened(error: sled::Error) -> StoreError {
                     | Kind::QuotaExceeded
             ) =>
         {
-            StoreError::io("open the key-value store", &error)
+            StoreError::io(format!("open the key-value store {}", path.display()), &error)
         }
         other => StoreError::damaged("the key-value store", other.to_string()),
     }
@@ -234,15 +258,7 @@ impl Backend for SledBackend {
 
     fn reopen(&self, meanwhile: &mut dyn FnMut() -> Result<(), StoreError>) -> Result<(), StoreError> {
         let mut db = self.db.write().unwrap_or_else(PoisonError::into_inner);
-        let closing = std::mem::replace(&mut *db, Err(closed()));
-        // Closing flushes, and after a failure that may fail or panic again; what counts is what is opened below.
-        let done = caught("close the key-value store", || {
-            drop(closing);
-            Ok(())
-        });
-        if let Err(error) = done {
-            tracing::warn!(%error, "the key-value store was not closed in good order");
-        }
+        close(std::mem::replace(&mut *db, Err(closed())));
         let done = meanwhile();
         *db = open(&self.path, self.cache_bytes);
         match &*db {

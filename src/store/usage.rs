@@ -35,7 +35,7 @@ impl Store {
         if batch.is_empty() {
             return Ok(());
         }
-        self.inner.commit(&batch, false)
+        self.inner.commit_lazily(&batch)
     }
 
     /// What was made with a key and is still there.
@@ -72,7 +72,7 @@ impl Store {
             }
         }
         if !gone.is_empty() && self.inner.writable().is_ok() {
-            self.inner.commit(&gone, false)?;
+            self.inner.commit_lazily(&gone)?;
         }
         Ok(usage)
     }

@@ -31,7 +31,7 @@ fn everything_is_there_after_reopening() {
         },
         jiff::Timestamp::now(),
     );
-    store.put_job(&job, true).unwrap();
+    store.put_job(&job).unwrap();
     let (classes, shapes) = (
         store.list_classes(None, 10).unwrap(),
         store.list_shapes(cat.id, None, 10).unwrap(),
@@ -164,7 +164,7 @@ fn lists_come_in_pages() {
             if i % 2 == 0 {
                 job.state = JobState::Canceled;
             }
-            store.put_job(&job, true).unwrap();
+            store.put_job(&job).unwrap();
             job
         })
         .collect();

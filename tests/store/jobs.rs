@@ -288,7 +288,7 @@ fn interrupted_jobs_run_again_but_not_for_ever() {
         );
         job.state = JobState::Processing;
         job.attempts = attempts;
-        store.put_job(&job, true).unwrap();
+        store.put_job(&job).unwrap();
         job.id
     };
     let (once, thrice) = (interrupted(1), interrupted(3));

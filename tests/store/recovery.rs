@@ -43,7 +43,7 @@ fn filled(path: &Path) -> (Catalogue, Job) {
         parameters: None,
     };
     let job = Job::new(kind, jiff::Timestamp::now());
-    store.put_job(&job, true).unwrap();
+    store.put_job(&job).unwrap();
     (catalogue(&store), job)
 }
 

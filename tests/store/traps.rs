@@ -60,7 +60,7 @@ fn an_idle_store_writes_nothing_by_itself() {
     let directory = TempDir::new().unwrap();
     let store = Store::open(directory.path(), &StoreOptions::default()).unwrap();
     store.create_class(name("cat")).unwrap();
-    store.put_job(&job(), false).unwrap();
+    store.put_progress(&job()).unwrap();
     let modified = || -> (SystemTime, u64) {
         let sled = directory.path().join("sled");
         let db = std::fs::metadata(sled.join("db")).unwrap();

@@ -3,6 +3,7 @@
 use crate::http::AppState;
 use crate::http::metrics;
 use crate::http::problem::{Code, Problem};
+use crate::http::state::Condition;
 use axum::Json;
 use axum::extract::State;
 use axum::http::header;
@@ -26,8 +27,9 @@ pub struct Liveness {
 pub struct Ready {
     /// `ready`.
     pub status: &'static str,
-    /// Every part that was looked at, `ok` each.
-    pub checks: BTreeMap<&'static str, &'static str>,
+    /// Every part that was looked at: `ok`, or `degraded: ` and what an operator should look at.
+    #[schema(example = json!({"store": "ok", "integrity": "ok"}))]
+    pub checks: BTreeMap<&'static str, String>,
 }
 
 /// Is the process alive?
@@ -44,35 +46,43 @@ pub async fn get_liveness() -> Json<Liveness> {
 
 /// Is the service ready?
 ///
-/// The problem names every part that is not, under `checks`.
+/// The problem names every part that is not, under `checks`. A part that is `degraded` keeps the service from nothing,
+/// such as `integrity` where an uploaded file is damaged.
 #[utoipa::path(
     get, path = "/readyz", tag = "operation",
     responses((status = 200, description = "It is", body = Ready))
 )]
 pub async fn get_readiness(State(state): State<AppState>) -> Result<Json<Ready>, Problem> {
     let readiness = state.readiness();
-    if readiness.is_ready() {
-        let checks = readiness
-            .checks
-            .into_iter()
-            .map(|(part, _)| (part, "ok"))
-            .collect();
+    let down: Vec<&str> = readiness
+        .checks
+        .iter()
+        .filter(|(_, condition)| matches!(condition, Condition::Down(_)))
+        .map(|(part, _)| *part)
+        .collect();
+    let detail = format!("not ready: {}", down.join(", "));
+    let ready = readiness.is_ready();
+    let checks: BTreeMap<&str, String> = readiness
+        .checks
+        .into_iter()
+        .map(|(part, condition)| {
+            let shown = match condition {
+                Condition::Well => "ok".to_owned(),
+                Condition::Degraded(why) => format!("degraded: {why}"),
+                Condition::Down(why) => why,
+            };
+            (part, shown)
+        })
+        .collect();
+    if ready {
         return Ok(Json(Ready {
             status: "ready",
             checks,
         }));
     }
-    let wrong: Vec<&str> = readiness
-        .checks
-        .iter()
-        .filter(|(_, w)| w.is_some())
-        .map(|(part, _)| *part)
-        .collect();
-    let detail = format!("not ready: {}", wrong.join(", "));
-    let checks: Map<String, Value> = readiness
-        .checks
+    let checks: Map<String, Value> = checks
         .into_iter()
-        .map(|(part, wrong)| (part.to_owned(), wrong.unwrap_or_else(|| "ok".to_owned()).into()))
+        .map(|(part, shown)| (part.to_owned(), shown.into()))
         .collect();
     Err(Problem::new(Code::NotReady, detail).with("checks", checks))
 }

@@ -9,7 +9,7 @@ use crate::http::dto::{Binary, FilesForm};
 use crate::http::extract::ApiQuery;
 use crate::http::limits::Allowance;
 use crate::http::problem::{Code, Problem};
-use crate::http::problem_from::{index_empty, recovery_mode};
+use crate::http::problem_from::index_empty;
 use crate::http::time_limit::TimeLimit;
 use crate::http::upload::{self, Upload};
 use crate::http::uploaded::UploadedMesh;
@@ -181,9 +181,7 @@ async fn begin(
     )
     .await?;
     let live = state.jobs.live_index();
-    if state.store.recovery_mode().is_some() {
-        return Err(recovery_mode());
-    }
+    state.require_index()?;
     if live.index.classes.is_empty() {
         return Err(index_empty());
     }

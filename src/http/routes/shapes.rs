@@ -24,6 +24,7 @@ use axum::response::{IntoResponse, Response};
 use futures_util::{StreamExt, stream};
 use serde_json::Value;
 use std::sync::{Arc, PoisonError};
+use tokio::io::AsyncReadExt;
 
 /// Upload shapes
 ///
@@ -310,7 +311,9 @@ pub async fn delete_shape(
 
 /// Download a shape's file
 ///
-/// As it was uploaded, byte for byte. With `if-none-match` and the file's tag the answer is 304.
+/// As it was uploaded, byte for byte. With `if-none-match` and the file's tag the answer is 304. The stored file is
+/// compared with its hash first: one that is gone is answered with `original_missing`, one that has changed on the disk
+/// with `original_damaged`; uploading the same file again heals it.
 #[utoipa::path(
     get, path = "/v1/classes/{class}/shapes/{shape}/original", tag = "shapes",
     params(
@@ -338,25 +341,22 @@ pub async fn get_original(
     ApiPath((class, shape)): ApiPath<(String, String)>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let (shape, path) = state
+    // Also for a copy that is there already: a condition counts only where the file could be sent (RFC 9110, 13.2.1).
+    let (shape, checked) = state
         .blocking(move |s| {
             let shape = find_shape(s, &class, &shape)?;
-            let path = s.store.original_path(shape.content);
-            Ok((shape, path))
+            let checked = s.store.open_original(shape.content)?;
+            Ok((shape, checked))
         })
         .await?;
     let tag = format!("\"{}\"", shape.content);
     let mut response = if is_at_hand(&headers, &tag) {
         StatusCode::NOT_MODIFIED.into_response()
     } else {
-        let missing = |e: std::io::Error| {
-            Problem::new(Code::OriginalMissing, "the shape's stored file cannot be read").logged(e)
-        };
-        let file = tokio::fs::File::open(path).await.map_err(missing)?;
-        let length = file.metadata().await.map_err(missing)?.len();
+        let file = tokio::fs::File::from_std(checked.file).take(checked.length);
         let body = Body::from_stream(tokio_util::io::ReaderStream::with_capacity(file, 64 << 10));
         let mut response = body.into_response();
-        insert(&mut response, header::CONTENT_LENGTH, &length.to_string());
+        insert(&mut response, header::CONTENT_LENGTH, &checked.length.to_string());
         insert(&mut response, header::CONTENT_TYPE, shape.format.media_type());
         insert(&mut response, header::CONTENT_DISPOSITION, &disposition(&shape));
         response

@@ -19,7 +19,7 @@ mod switch;
 mod write;
 
 pub use restore::Staged;
-pub(super) use switch::{finish_restore, go_on};
+pub(super) use switch::{finish_restore, go_on, log_in_force};
 
 use super::{Store, StoreError, files};
 use crate::model::{ContentHash, Snapshot, SnapshotId, SnapshotOrigin};

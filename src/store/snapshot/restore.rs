@@ -99,6 +99,8 @@ impl Staged<'_> {
             .reopen(&mut || go_on(data))
             .and_then(|()| settle(data, &*inner.backend, &mut notes));
         *writer = switched.map_err(|e| inner.fail(e))?;
+        inner.failure.acknowledge(writer.sequence);
+        self.store.forget_damage();
         for line in notes {
             tracing::warn!(line, "restored");
         }
@@ -114,6 +116,8 @@ fn examine(directory: &Path, options: &StoreOptions, manifest: &Manifest) -> Res
         other => StoreError::bad_snapshot(other.to_string()),
     };
     let store = Store::open(directory, options).map_err(of_snapshot)?;
+    // A full disk opens read-only, with the log not written yet.
+    store.inner.writable()?;
     let wrong = |what: String| Err(StoreError::bad_snapshot(what));
     let known = |hash| manifest.missing.contains(&hash) || store.original_path(hash).exists();
     let (mut classes, mut shapes) = (0, 0);
@@ -166,6 +170,7 @@ fn carry_over(store: &Store, directory: &Path) -> Result<(), StoreError> {
             cache_bytes: 16 << 20,
         },
     )?;
+    to.inner.writable()?;
     let own = store.api_keys()?;
     if !own.is_empty() {
         for key in to.api_keys()? {

@@ -6,7 +6,7 @@
 
 use super::super::open::LOG;
 use super::super::{StoreError, files, originals};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub(super) const UNPACKING: &str = "restore.unpacking";
 const READY: &str = "restore.ready";
@@ -28,6 +28,12 @@ pub(in super::super) fn finish_restore(data: &Path) -> Result<(), StoreError> {
     remove(&data.join(UNPACKING))?;
     go_on(data)?;
     super::tidy(data)
+}
+
+/// The catalogue log of the state that counts, also in the middle of a switch.
+pub(in super::super) fn log_in_force(data: &Path) -> PathBuf {
+    let restored = data.join(READY).join(LOG);
+    if restored.exists() { restored } else { data.join(LOG) }
 }
 
 /// Goes on with a switch that was declared, and leaves everything else alone.
