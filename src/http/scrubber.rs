@@ -23,7 +23,10 @@ pub async fn run(state: AppState) {
         Ok(())
     });
     if let Err(problem) = rechecked.await {
-        tracing::error!(?problem, "what the last scrub found damaged was not looked at again");
+        tracing::error!(
+            ?problem,
+            "what the last scrub found damaged was not looked at again"
+        );
     }
     let mut wait = SETTLE.min(every);
     loop {
@@ -49,7 +52,10 @@ pub async fn run(state: AppState) {
 
 fn is_due(parts: &Parts, every: Duration) -> bool {
     let age = |at: Timestamp| Timestamp::now().duration_since(at).unsigned_abs();
-    parts.store.last_scrub().is_none_or(|last| age(last.started_at) >= every)
+    parts
+        .store
+        .last_scrub()
+        .is_none_or(|last| age(last.started_at) >= every)
 }
 
 /// Looks at everything once.

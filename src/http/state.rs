@@ -129,7 +129,10 @@ impl AppState {
             // What cannot be written can still be shown.
             Err(denied @ StoreError::Denied { .. }) => {
                 let store = Store::open_read_only(&config.data_dir, denied)?;
-                tracing::error!(why = store.recovery_mode(), "recovery mode: only the catalogue is served");
+                tracing::error!(
+                    why = store.recovery_mode(),
+                    "recovery mode: only the catalogue is served"
+                );
                 store
             }
             opened => opened?,
@@ -230,9 +233,9 @@ impl AppState {
     /// Whether the service can answer.
     pub fn readiness(&self) -> Readiness {
         let store = match self.store.health() {
-            Health::Ready if self.jobs.is_behind() => {
-                Condition::Down("the disk has space again; what it kept from being done is being done".to_owned())
-            }
+            Health::Ready if self.jobs.is_behind() => Condition::Down(
+                "the disk has space again; what it kept from being done is being done".to_owned(),
+            ),
             Health::Ready => Condition::Well,
             Health::ReadOnly { why } if self.store.recovery_mode().is_some() => Condition::Down(why),
             Health::ReadOnly { why } => Condition::Down(format!("read-only since a write failed: {why}")),

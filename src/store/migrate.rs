@@ -68,7 +68,10 @@ pub(super) fn check_format(data: &Path) -> Result<Format, StoreError> {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Format::Unknown),
         Err(error) => return Err(StoreError::io(format!("read {}", path.display()), &error)),
     };
-    let Some(found) = std::str::from_utf8(&text).ok().and_then(|t| t.trim().parse().ok()) else {
+    let Some(found) = std::str::from_utf8(&text)
+        .ok()
+        .and_then(|t| t.trim().parse().ok())
+    else {
         tracing::warn!(
             file = %path.display(),
             "the file holds no format number and is written anew; the records know their format"
@@ -76,7 +79,11 @@ pub(super) fn check_format(data: &Path) -> Result<Format, StoreError> {
         return Ok(Format::Unknown);
     };
     refuse_newer(found)?;
-    Ok(if found == FORMAT { Format::Current } else { Format::Older })
+    Ok(if found == FORMAT {
+        Format::Current
+    } else {
+        Format::Older
+    })
 }
 
 /// Writes `DATA/format`, before any migration of that format changes a record.

@@ -129,6 +129,7 @@ struct Inner {
     snapshots: Mutex<()>,
     /// What was found damaged and is not healed yet.
     damage: Mutex<Damage>,
+    last_scrub: Mutex<Option<ScrubReport>>,
     failure: Arc<Failure>,
     recovery: Vec<String>,
     /// Released when the last clone is dropped. `None` where nothing may be written.

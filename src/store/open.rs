@@ -8,7 +8,7 @@ use super::migrate::Format;
 use super::payload::Number;
 use super::records::Records;
 use super::standby::Standby;
-use super::{Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, rebuild, snapshot};
+use super::{Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, rebuild, scrub, snapshot};
 use crate::model::Class;
 use std::fs::{File, TryLockError};
 use std::path::Path;
@@ -143,6 +143,7 @@ impl Parts<'_> {
                 pinned: Mutex::default(),
                 snapshots: Mutex::new(()),
                 damage: Mutex::default(),
+                last_scrub: Mutex::new(scrub::read_note(self.path)),
                 failure: self.failure,
                 recovery: self.recovery,
                 _lock: self.lock,
@@ -159,13 +160,20 @@ fn prepare(path: &Path, failure: &Failure) -> Result<File, StoreError> {
     if new {
         // Said before anything is made, so that nothing half-made is left.
         let place = path.ancestors().find(|p| p.is_dir()).unwrap_or(Path::new("."));
-        let what = format!("make the data directory {}; free some space and start again", path.display());
+        let what = format!(
+            "make the data directory {}; free some space and start again",
+            path.display()
+        );
         require_space(place, &what)?;
     }
     std::fs::create_dir_all(path).map_err(fail)?;
     let lock_path = path.join("lock");
-    let lock = File::create(&lock_path)
-        .map_err(|e| StoreError::io(format!("open the data directory: open {}", lock_path.display()), &e))?;
+    let lock = File::create(&lock_path).map_err(|e| {
+        StoreError::io(
+            format!("open the data directory: open {}", lock_path.display()),
+            &e,
+        )
+    })?;
     match lock.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {

@@ -156,17 +156,11 @@ impl Store {
         let damage = match error.kind() {
             ErrorKind::NotFound => OriginalDamage::Missing,
             ErrorKind::PermissionDenied | ErrorKind::OutOfMemory => {
-                return StoreError::io(
-                    format!("read {}", self.original_path(content).display()),
-                    error,
-                );
+                return StoreError::io(format!("read {}", self.original_path(content).display()), error);
             }
             // EIO of a bad sector, mostly; too many open files is no damage.
             _ if error.raw_os_error().is_some_and(is_shortage) => {
-                return StoreError::io(
-                    format!("read {}", self.original_path(content).display()),
-                    error,
-                );
+                return StoreError::io(format!("read {}", self.original_path(content).display()), error);
             }
             _ => OriginalDamage::Unreadable,
         };

@@ -62,7 +62,10 @@ impl Records {
     }
 
     fn current(&self) -> Current {
-        self.current.read().unwrap_or_else(PoisonError::into_inner).clone()
+        self.current
+            .read()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
     }
 
     /// An engine that cannot read for want of space, not even opened anew, gives way to the log.

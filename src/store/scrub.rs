@@ -8,6 +8,8 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::{MutexGuard, PoisonError};
 
 /// Records checked per scan.
 const CHUNK: usize = 64;
@@ -31,6 +33,12 @@ pub struct ScrubReport {
     pub damaged_originals: Vec<ContentHash>,
     /// Records and lines that fail their checksum.
     pub damaged_records: Vec<String>,
+}
+
+/// The note of the last complete look; one that cannot be read is as good as none.
+pub(super) fn read_note(data: &Path) -> Option<ScrubReport> {
+    let note = std::fs::read(data.join(NOTE)).ok()?;
+    serde_json::from_slice(&note).ok()
 }
 
 impl Store {
@@ -72,18 +80,29 @@ impl Store {
             })?;
             files::write_durably(&self.path().join(NOTE), &note)?;
         }
+        *self.last_report() = Some(report.clone());
         Ok(Some(report))
     }
 
-    /// What the last complete look at everything found; `None` where there was none, or its note cannot be read.
+    /// What the last complete look at everything found; `None` where there was none.
     pub fn last_scrub(&self) -> Option<ScrubReport> {
-        let note = std::fs::read(self.path().join(NOTE)).ok()?;
-        serde_json::from_slice(&note).ok()
+        self.last_report().clone()
+    }
+
+    fn last_report(&self) -> MutexGuard<'_, Option<ScrubReport>> {
+        // Assigned whole, never half.
+        self.inner
+            .last_scrub
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Looks again at the files the last scrub found damaged, so that a restart does not forget them.
     pub fn recheck_damage(&self) {
-        for content in self.last_scrub().map_or_else(Vec::new, |last| last.damaged_originals) {
+        for content in self
+            .last_scrub()
+            .map_or_else(Vec::new, |last| last.damaged_originals)
+        {
             // Remembered by the check itself.
             let _ = self.check_original(content, &mut |_| ControlFlow::Continue(()));
         }

@@ -129,7 +129,12 @@ fn remove_unfinished_snapshots(path: &Path) -> Result<(), StoreError> {
     let entries = match std::fs::read_dir(path) {
         Ok(entries) => entries,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        Err(error) => return Err(StoreError::io(format!("list the key-value store {}", path.display()), &error)),
+        Err(error) => {
+            return Err(StoreError::io(
+                format!("list the key-value store {}", path.display()),
+                &error,
+            ));
+        }
     };
     for entry in entries.flatten() {
         if entry.path().extension().is_some_and(|e| e == "generating") {

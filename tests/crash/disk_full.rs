@@ -2,6 +2,7 @@
 //! there is space, without a restart.
 
 use crate::client::{Answer, Client};
+use crate::disk::Disk;
 use crate::kills::small;
 use crate::mesh;
 use crate::model::{Change, Worker};
@@ -9,47 +10,7 @@ use crate::process::Service;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
-use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::time::{Duration, Instant};
-
-/// A small disk of its own, gone when dropped.
-struct Disk(PathBuf);
-
-impl Disk {
-    /// `None` where this process may not mount one.
-    fn mount(at: &Path, megabytes: usize) -> Option<Self> {
-        let mounted = Command::new("mount")
-            .args(["-t", "tmpfs", "-o", &format!("size={megabytes}m"), "tmpfs"])
-            .arg(at)
-            .output();
-        mounted
-            .is_ok_and(|output| output.status.success())
-            .then(|| Self(at.to_owned()))
-    }
-
-    /// Takes all the space there is but about this much, in a file.
-    fn fill(&self, but: usize) {
-        let ballast = self.0.join("ballast");
-        let block = vec![0x5a_u8; 16 << 10];
-        let mut file = std::fs::File::create(&ballast).unwrap();
-        let mut length = 0;
-        while std::io::Write::write_all(&mut file, &block).is_ok() {
-            length += block.len();
-        }
-        file.set_len(length.saturating_sub(but) as u64).unwrap();
-    }
-
-    fn free(&self) {
-        std::fs::remove_file(self.0.join("ballast")).unwrap();
-    }
-}
-
-impl Drop for Disk {
-    fn drop(&mut self) {
-        let _ = Command::new("umount").arg("-l").arg(&self.0).output();
-    }
-}
 
 fn upload(client: &Client, class: &str, seed: u32) -> Answer {
     let path = format!("/v1/classes/{class}/shapes?create=true&name={seed}.off");
@@ -58,7 +19,7 @@ fn upload(client: &Client, class: &str, seed: u32) -> Answer {
         .expect("the service went away")
 }
 
-fn wait_for(what: &str, mut there: impl FnMut() -> bool) {
+pub fn wait_for(what: &str, mut there: impl FnMut() -> bool) {
     let began = Instant::now();
     while !there() {
         assert!(
@@ -74,7 +35,7 @@ fn a_full_disk_is_said_loses_nothing_and_is_got_over() {
     let directory = tempfile::tempdir().unwrap();
     let data = directory.path().join("data");
     std::fs::create_dir(&data).unwrap();
-    let Some(disk) = Disk::mount(&data, 24) else {
+    let Some(disk) = Disk::small(&data, 24) else {
         println!(
             "a_full_disk_is_said_loses_nothing_and_is_got_over: skipped, no file system can be mounted here"
         );

@@ -1,12 +1,15 @@
 //! The real process, killed at random moments, on a disk that may be full: what was acknowledged must be there at the
 //! next start, byte for byte, and nothing half-made.
 //!
-//! `SHAPELEX_KILLS` sets how often it is killed (30 unless told otherwise; a night takes 500), `SHAPELEX_SEED` where
-//! the randomness starts.
+//! `SHAPELEX_KILLS` sets how often it is killed (30 unless told otherwise; a night takes 500), `SHAPELEX_STARTS` how
+//! often it starts on a full disk (16), `SHAPELEX_SEED` where the randomness starts.
 #![cfg(all(feature = "service", unix))]
 
 mod client;
+mod denied;
+mod disk;
 mod disk_full;
+mod full_starts;
 mod kills;
 mod memory;
 mod model;

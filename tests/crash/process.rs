@@ -4,7 +4,7 @@ use serde_json::Value;
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 /// A running service; killed when dropped.
@@ -13,8 +13,8 @@ pub struct Service {
     pub url: String,
 }
 
-/// Starts the process without waiting for it to listen.
-pub fn spawn(directory: &Path, more: &[&str]) -> Child {
+/// The command that starts the service on `data` below a directory, its log beside it.
+pub fn command(directory: &Path, more: &[&str]) -> Command {
     let log = OpenOptions::new()
         .create(true)
         .append(true)
@@ -38,9 +38,13 @@ pub fn spawn(directory: &Path, more: &[&str]) -> Child {
         .args(more)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
-        .stderr(log)
-        .spawn()
-        .unwrap()
+        .stderr(log);
+    command
+}
+
+/// Starts the process without waiting for it to listen.
+pub fn spawn(directory: &Path, more: &[&str]) -> Child {
+    command(directory, more).spawn().unwrap()
 }
 
 impl Service {
@@ -49,19 +53,31 @@ impl Service {
     /// # Panics
     /// With what it logged, where it does not start.
     pub fn start(directory: &Path, more: &[&str]) -> Self {
-        let mut child = spawn(directory, more);
+        Self::try_start(spawn(directory, more))
+            .unwrap_or_else(|status| panic!("it did not start ({status}):\n{}", tail(directory)))
+    }
+
+    /// Waits until a process listens, or gives the status it ended with.
+    pub fn try_start(mut child: Child) -> Result<Self, ExitStatus> {
         let mut line = String::new();
         BufReader::new(child.stdout.as_mut().unwrap())
             .read_line(&mut line)
             .unwrap();
-        let Ok(told) = serde_json::from_str::<Value>(&line) else {
-            let status = child.wait().unwrap();
-            panic!("it did not start ({status}):\n{}", tail(directory));
-        };
-        Self {
-            child,
-            url: told["listening"].as_str().unwrap().to_owned(),
+        match serde_json::from_str::<Value>(&line) {
+            Ok(told) => Ok(Self {
+                url: told["listening"].as_str().unwrap().to_owned(),
+                child,
+            }),
+            Err(_) => Err(child.wait().unwrap()),
         }
+    }
+
+    /// SIGTERM, and waits until the process has ended in good order.
+    pub fn stop(mut self) {
+        let pid = self.child.id().to_string();
+        let told = Command::new("kill").args(["-TERM", &pid]).status().unwrap();
+        assert!(told.success());
+        self.child.wait().unwrap();
     }
 
     /// The process's number.

@@ -229,10 +229,16 @@ fn a_changed_or_missing_file_is_found() {
         .shape
         .content;
     std::fs::write(store.original_path(content), b"nesh").unwrap();
-    assert!(matches!(store.original(content), Err(StoreError::Damaged { .. })));
+    assert!(matches!(
+        store.original(content),
+        Err(StoreError::Original { .. })
+    ));
     // Sending the file again heals it.
     store.add_shapes(class, vec![shape("mesh", None)]).unwrap();
     assert_eq!(store.original(content).unwrap(), b"mesh");
     std::fs::remove_file(store.original_path(content)).unwrap();
-    assert!(matches!(store.original(content), Err(StoreError::Damaged { .. })));
+    assert!(matches!(
+        store.original(content),
+        Err(StoreError::Original { .. })
+    ));
 }

@@ -4,6 +4,7 @@ use crate::http::AppState;
 use crate::http::metrics;
 use crate::http::problem::{Code, Problem};
 use crate::http::state::Condition;
+use crate::store::ScrubReport;
 use axum::Json;
 use axum::extract::State;
 use axum::http::header;
@@ -30,6 +31,37 @@ pub struct Ready {
     /// Every part that was looked at: `ok`, or `degraded: ` and what an operator should look at.
     #[schema(example = json!({"store": "ok", "integrity": "ok"}))]
     pub checks: BTreeMap<&'static str, String>,
+    /// The last check of all stored files and records; missing before the first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub last_scrub: Option<Scrubbed>,
+}
+
+/// What a check of all stored files and records found.
+#[derive(Serialize, ToSchema)]
+pub struct Scrubbed {
+    /// When it ended.
+    #[schema(format = DateTime)]
+    pub finished_at: String,
+    /// Uploaded files that were read.
+    pub originals: u64,
+    /// Records that were read.
+    pub records: u64,
+    /// Uploaded files that were damaged or gone.
+    pub damaged_originals: usize,
+    /// Records that were damaged.
+    pub damaged_records: usize,
+}
+
+impl From<ScrubReport> for Scrubbed {
+    fn from(report: ScrubReport) -> Self {
+        Self {
+            finished_at: report.finished_at.to_string(),
+            originals: report.originals,
+            records: report.records,
+            damaged_originals: report.damaged_originals.len(),
+            damaged_records: report.damaged_records.len(),
+        }
+    }
 }
 
 /// Is the process alive?
@@ -78,6 +110,7 @@ pub async fn get_readiness(State(state): State<AppState>) -> Result<Json<Ready>,
         return Ok(Json(Ready {
             status: "ready",
             checks,
+            last_scrub: state.store.last_scrub().map(Into::into),
         }));
     }
     let checks: Map<String, Value> = checks

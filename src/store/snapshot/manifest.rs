@@ -1,7 +1,7 @@
 //! What a snapshot says about itself.
 
 use super::super::StoreError;
-use crate::model::{ContentHash, SnapshotId, SnapshotOrigin};
+use crate::model::{ContentHash, Snapshot, SnapshotId, SnapshotOrigin};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
@@ -56,6 +56,25 @@ impl Manifest {
     pub fn unpacked_bytes(&self) -> u64 {
         let originals = self.originals.iter().map(|m| m.bytes);
         originals.fold(self.records.bytes, u64::saturating_add)
+    }
+
+    /// The description of the file that holds it.
+    pub fn describe(self, bytes: u64, hash: ContentHash) -> Snapshot {
+        Snapshot {
+            id: self.id,
+            origin: self.origin,
+            created_at: self.created_at,
+            data_format: self.data_format,
+            bytes,
+            hash,
+            classes: self.classes,
+            shapes: self.shapes,
+            originals: self.originals.len() as u64,
+            unpacked_bytes: self.unpacked_bytes(),
+            generation: self.generation,
+            missing: self.missing.len() as u64,
+            shapelex: self.shapelex,
+        }
     }
 
     /// Reads a manifest.

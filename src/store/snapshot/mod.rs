@@ -105,7 +105,12 @@ impl Store {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 return Err(StoreError::NoSnapshot { id });
             }
-            Err(error) => return Err(StoreError::io("read the description of a snapshot", &error)),
+            Err(error) => {
+                return Err(StoreError::io(
+                    format!("read {}", self.snapshot_note(id).display()),
+                    &error,
+                ));
+            }
         };
         serde_json::from_slice(&text)
             .map_err(|e| StoreError::damaged(format!("the description of snapshot {id}"), e.to_string()))
@@ -131,6 +136,11 @@ impl Store {
             .filter_map(|id| match self.snapshot(id) {
                 // Deleted meanwhile.
                 Err(StoreError::NoSnapshot { .. }) => None,
+                // One description that is damaged does not hide the others.
+                Err(error @ StoreError::Damaged { .. }) => {
+                    tracing::warn!(%error, "a snapshot is not listed; the next start describes it anew");
+                    None
+                }
                 other => Some(other),
             })
             .collect()
@@ -176,16 +186,39 @@ fn list(directory: &Path) -> Result<Vec<PathBuf>, StoreError> {
     }
 }
 
-/// Removes what an interrupted snapshot or deletion left.
+/// Removes what an interrupted snapshot or deletion left, and describes snapshots anew whose description is damaged.
 pub(super) fn tidy(data: &Path) -> Result<(), StoreError> {
-    for path in list(&data.join("snapshots"))? {
+    let directory = data.join("snapshots");
+    for path in list(&directory)? {
         let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
-        let undescribed = name
-            .strip_suffix(".tar.zst")
-            .is_some_and(|id| !data.join("snapshots").join(format!("{id}.json")).exists());
-        if name.starts_with(".writing-") || undescribed {
+        if name.starts_with(".writing-") {
             files::remove(&path)?;
+        } else if let Some(id) = name.strip_suffix(".tar.zst") {
+            let note = directory.join(format!("{id}.json"));
+            if !note.exists() {
+                files::remove(&path)?;
+            } else if !is_readable(&note) {
+                describe_anew(&path, &note)?;
+            }
         }
     }
     Ok(())
+}
+
+fn is_readable(note: &Path) -> bool {
+    std::fs::read(note).is_ok_and(|text| serde_json::from_slice::<Snapshot>(&text).is_ok())
+}
+
+/// A file that is damaged, too, is left for a person to look at.
+fn describe_anew(file: &Path, note: &Path) -> Result<(), StoreError> {
+    match read::describe(file) {
+        Ok(snapshot) => {
+            tracing::warn!(snapshot = %snapshot.id, "the description of a snapshot was damaged and is written anew");
+            write::write_note(note, &snapshot)
+        }
+        Err(error) => {
+            tracing::warn!(%error, file = %file.display(), "a snapshot and its description are damaged");
+            Ok(())
+        }
+    }
 }

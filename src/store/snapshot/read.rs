@@ -9,7 +9,7 @@ use super::super::sled_backend::SledBackend;
 use super::super::{StoreError, StoreOptions, files, originals, record};
 use super::manifest::{CHECKSUM, MANIFEST, MAX_BYTES, Manifest, Member, RECORDS};
 use super::write::Hashing;
-use crate::model::ContentHash;
+use crate::model::{ContentHash, Snapshot};
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Write};
 use std::path::Path;
@@ -83,6 +83,18 @@ pub(super) fn unpack(
     load(&records, &into.join("sled"), options)?;
     files::remove(&records)?;
     Ok(manifest)
+}
+
+/// Describes a snapshot's file from what is in it.
+pub(super) fn describe(file: &Path) -> Result<Snapshot, StoreError> {
+    let fail = |e: std::io::Error| StoreError::io(format!("read {}", file.display()), &e);
+    let mut decoder = zstd::Decoder::new(File::open(file).map_err(fail)?).map_err(|e| bad(&e))?;
+    decoder.window_log_max(WINDOW_LOG).map_err(|e| bad(&e))?;
+    let mut archive = tar::Archive::new(decoder);
+    let manifest = read_manifest(&mut archive.entries().map_err(|e| bad(&e))?.raw(true))?;
+    let mut whole = Hashing::new(BufReader::new(File::open(file).map_err(fail)?));
+    let bytes = std::io::copy(&mut whole, &mut std::io::sink()).map_err(fail)?;
+    Ok(manifest.describe(bytes, whole.hash()))
 }
 
 fn read_manifest<R: Read>(entries: &mut Entries<'_, R>) -> Result<Manifest, StoreError> {

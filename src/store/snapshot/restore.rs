@@ -44,7 +44,8 @@ impl Store {
         self.inner.writable()?;
         let directory = self.path().join(UNPACKING);
         remove(&directory)?;
-        std::fs::create_dir_all(&directory).map_err(|e| StoreError::io("unpack a snapshot", &e))?;
+        std::fs::create_dir_all(&directory)
+            .map_err(|e| StoreError::io(format!("make {}", directory.display()), &e))?;
         let mut staged = Staged {
             store: self,
             directory,
@@ -73,7 +74,8 @@ impl Store {
     /// [`StoreError::NoSnapshot`], and as [`Store::stage_snapshot`].
     pub fn stage_own_snapshot(&self, id: SnapshotId, limit: u64) -> Result<Staged<'_>, StoreError> {
         self.snapshot(id)?;
-        let file = File::open(self.snapshot_path(id)).map_err(|e| StoreError::io("open a snapshot", &e))?;
+        let path = self.snapshot_path(id);
+        let file = File::open(&path).map_err(|e| StoreError::io(format!("open {}", path.display()), &e))?;
         self.stage_snapshot(file, limit)
     }
 }

@@ -33,7 +33,11 @@ pub(in super::super) fn finish_restore(data: &Path) -> Result<(), StoreError> {
 /// The catalogue log of the state that counts, also in the middle of a switch.
 pub(in super::super) fn log_in_force(data: &Path) -> PathBuf {
     let restored = data.join(READY).join(LOG);
-    if restored.exists() { restored } else { data.join(LOG) }
+    if restored.exists() {
+        restored
+    } else {
+        data.join(LOG)
+    }
 }
 
 /// Goes on with a switch that was declared, and leaves everything else alone.
@@ -41,7 +45,8 @@ pub(in super::super) fn go_on(data: &Path) -> Result<(), StoreError> {
     let (ready, replaced) = (data.join(READY), data.join(REPLACED));
     if ready.exists() {
         tracing::warn!("switching to the restored state");
-        std::fs::create_dir_all(&replaced).map_err(|e| StoreError::io("put the old state aside", &e))?;
+        std::fs::create_dir_all(&replaced)
+            .map_err(|e| StoreError::io(format!("make {}", replaced.display()), &e))?;
         for part in PARTS {
             let (new, place) = (ready.join(part), data.join(part));
             if !new.exists() {

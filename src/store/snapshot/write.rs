@@ -38,7 +38,7 @@ impl Store {
         self.inner.writable()?;
         let directory = self.snapshot_directory();
         std::fs::create_dir_all(&directory)
-            .map_err(|e| StoreError::io("make the snapshots' directory", &e))?;
+            .map_err(|e| StoreError::io(format!("make {}", directory.display()), &e))?;
         files::sync_directory(self.path())?;
         let _files_stay = self.pin();
         let created_at = Timestamp::now();
@@ -59,34 +59,23 @@ impl Store {
             missing,
         };
         let (bytes, hash) = self.pack(&directory, &manifest, dump.file.path())?;
-        let snapshot = Snapshot {
-            id: manifest.id,
-            origin,
-            created_at,
-            data_format: manifest.data_format,
-            bytes,
-            hash,
-            classes: manifest.classes,
-            shapes: manifest.shapes,
-            originals: manifest.originals.len() as u64,
-            unpacked_bytes: manifest.unpacked_bytes(),
-            generation: manifest.generation,
-            missing: manifest.missing.len() as u64,
-            shapelex: manifest.shapelex,
-        };
-        let note = serde_json::to_vec_pretty(&snapshot).map_err(|e| encoding(&e))?;
-        // Described last: what is not described is not there.
-        if let Err(error) = files::write_durably(&self.snapshot_note(snapshot.id), &note) {
-            files::remove(&self.snapshot_path(snapshot.id))?;
-            return Err(error);
-        }
+        let snapshot = manifest.describe(bytes, hash);
+        write_note(&self.snapshot_note(snapshot.id), &snapshot).inspect_err(|_| {
+            // What is not described is not there, and the next start removes it.
+            let _ = files::remove(&self.snapshot_path(snapshot.id));
+        })?;
         Ok(snapshot)
     }
 
     /// Copies the records of one moment. Holding the writer keeps catalogue and generation as they are, and with the
     /// generation the dictionaries it names.
     fn dump_records(&self, directory: &Path) -> Result<Dump, StoreError> {
-        let fail = |e: std::io::Error| StoreError::io("copy the records for a snapshot", &e);
+        let fail = |e: std::io::Error| {
+            StoreError::io(
+                format!("copy the records for a snapshot into {}", directory.display()),
+                &e,
+            )
+        };
         let backend = &*self.inner.backend;
         let file = tempfile::Builder::new()
             .prefix(".writing-")
@@ -150,23 +139,13 @@ impl Store {
     ) -> Result<(Vec<Member>, Vec<ContentHash>), StoreError> {
         let (mut present, mut missing) = (Vec::new(), Vec::new());
         for content in contents {
-            let path = self.original_path(*content);
-            match File::open(&path) {
-                Ok(file) => {
-                    let mut counted = Counted::new(std::io::sink());
-                    std::io::copy(&mut BufReader::new(file), &mut counted)
-                        .map_err(|e| StoreError::io(format!("read {}", path.display()), &e))?;
-                    let member = counted
-                        .finish()
-                        .map_err(|e| StoreError::io(format!("read {}", path.display()), &e))?;
-                    if member.hash == *content {
-                        present.push(member);
-                    } else {
-                        missing.push(*content);
-                    }
-                }
-                Err(error) if error.kind() == std::io::ErrorKind::NotFound => missing.push(*content),
-                Err(error) => return Err(StoreError::io(format!("read {}", path.display()), &error)),
+            match self.open_original(*content) {
+                Ok(checked) => present.push(Member {
+                    hash: *content,
+                    bytes: checked.length,
+                }),
+                Err(StoreError::Original { .. }) => missing.push(*content),
+                Err(other) => return Err(other),
             }
         }
         if !missing.is_empty() {
@@ -185,7 +164,8 @@ impl Store {
         manifest: &Manifest,
         records: &Path,
     ) -> Result<(u64, ContentHash), StoreError> {
-        let fail = |e: std::io::Error| StoreError::io("write a snapshot", &e);
+        let fail =
+            |e: std::io::Error| StoreError::io(format!("write a snapshot into {}", directory.display()), &e);
         let file = tempfile::Builder::new()
             .prefix(".writing-")
             .tempfile_in(directory)
@@ -235,6 +215,12 @@ impl Store {
         files::sync_directory(directory)?;
         Ok((bytes, hash))
     }
+}
+
+/// Writes a snapshot's description, after its file: what is not described is not there.
+pub(super) fn write_note(path: &Path, snapshot: &Snapshot) -> Result<(), StoreError> {
+    let note = serde_json::to_vec_pretty(snapshot).map_err(|e| encoding(&e))?;
+    files::write_durably(path, &note)
 }
 
 fn encoding(error: &serde_json::Error) -> StoreError {
