@@ -43,11 +43,14 @@ impl Store {
         };
         let writer = match settled {
             Ok(writer) => writer,
-            // The records stay as they are until there is space; what the log has beyond them was never answered.
+            // The records stay as they are until there is space.
             Err(full @ StoreError::Full { .. }) => {
-                failure.remember(full);
-                let sequence = sequence(&records)?;
-                Writer::closed(&log, sequence)
+                failure.remember(full.clone());
+                let in_log = catalogue_log::read(&log, |_, _| Ok(()))?.last;
+                if in_log > sequence(&records)? {
+                    records.read_log_instead(full)?;
+                }
+                Writer::closed(&log, sequence(&records)?)
             }
             Err(other) => return Err(other),
         };

@@ -61,6 +61,17 @@ impl Records {
         })
     }
 
+    /// Reads the whole log in the engine's place, where the engine could not be brought to the state of the log.
+    ///
+    /// # Errors
+    /// `why` where there is no log; a failure of reading it.
+    pub fn read_log_instead(&self, why: StoreError) -> Result<(), StoreError> {
+        let standby = Standby::from_log(&self.data.join(LOG), u64::MAX, why)?;
+        let mut place = self.current.write().unwrap_or_else(PoisonError::into_inner);
+        *place = Current::Standby(Arc::new(standby));
+        Ok(())
+    }
+
     fn current(&self) -> Current {
         self.current
             .read()

@@ -7,6 +7,7 @@
 
 use super::backend::{Backend, Batch, Entry};
 use super::ordered_map::OrderedMap;
+use super::payload::Number;
 use super::{StoreError, catalogue_log, event, keys};
 use std::path::Path;
 use std::sync::{PoisonError, RwLock};
@@ -52,6 +53,14 @@ impl Standby {
             }
             Ok(())
         })?;
+        let mut batch = Batch::default();
+        let sequence = Number(scan.last.min(last));
+        event::put(&mut batch, keys::META_SEQUENCE.to_vec(), &sequence)?;
+        standby
+            .map
+            .write()
+            .unwrap_or_else(PoisonError::into_inner)
+            .apply(&batch);
         for (line, detail) in &scan.damaged {
             tracing::warn!(line, detail, "a line of the catalogue log could not be read");
         }
