@@ -1,7 +1,7 @@
 //! Why the store could not do what it was asked.
 
-use super::originals::OriginalDamage;
 use crate::model::{ClassId, ClassName, ContentHash, JobId, KeyId, KeyName, ShapeId, SnapshotId};
+use std::fmt;
 use std::path::PathBuf;
 
 /// The store's errors. Those up to [`StoreError::BadSnapshot`] are the caller's; the others are the machine's.
@@ -170,5 +170,26 @@ impl StoreError {
             what: what.into(),
             detail: detail.into(),
         }
+    }
+}
+
+/// What is wrong with a stored file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum OriginalDamage {
+    /// It is gone.
+    Missing,
+    /// Its contents are not those that were uploaded.
+    Changed,
+    /// The disk fails to read it.
+    Unreadable,
+}
+
+impl fmt::Display for OriginalDamage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Missing => "is missing",
+            Self::Changed => "does not hold what was uploaded",
+            Self::Unreadable => "cannot be read",
+        })
     }
 }

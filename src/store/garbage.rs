@@ -1,7 +1,8 @@
 //! Removing what nothing refers to any more: dictionaries of earlier generations, stored files without a shape, cached
 //! signatures of other parameters, unfinished temporary files.
 
-use super::{Batch, Store, StoreError, baselines, files, keys, originals, record};
+use super::layout::ORIGINALS;
+use super::{Batch, Store, StoreError, baselines, files, keys, record};
 use crate::model::{ContentHash, Generation, Shape};
 use crate::parameters::Parameters;
 use std::collections::BTreeSet;
@@ -42,7 +43,7 @@ impl Store {
         self.inner.writable()?;
         // A snapshot being written may need what nothing refers to any more; the next collection takes it.
         let held = self.is_pinned(&BTreeSet::new());
-        files::walk(&self.inner.path.join(originals::DIRECTORY), |path, name| {
+        files::walk(&self.inner.path.join(ORIGINALS), |path, name| {
             let kept = match name.parse::<ContentHash>() {
                 Ok(content) => self.is_referenced(content)?,
                 Err(_) => false,

@@ -1,25 +1,20 @@
 //! Opening a store: lock, format, records, log, in this order; what a crash left is put right on the way.
 
 use super::backend::{Backend, Batch};
-use super::catalogue_log::{self, CatalogueLog, LogScan};
-use super::event::{self, Event, get, put, shapes_of};
+use super::catalogue_log::{self, CatalogueLog};
+use super::event::{Event, get, put, shapes_of};
 use super::failure::{Failure, require_space};
+use super::layout::{LOG, has_originals, has_records, is_empty};
 use super::migrate::Format;
 use super::payload::Number;
 use super::records::Records;
+use super::replay::{replay, sequence};
 use super::standby::Standby;
 use super::{Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, rebuild, scrub, snapshot};
 use crate::model::Class;
 use std::fs::{File, TryLockError};
 use std::path::Path;
 use std::sync::{Arc, Mutex, RwLock};
-
-pub(super) const LOG: &str = "catalogue.log";
-/// Where records are, the second one for a moment during a rebuild.
-const RECORDS: [&str; 2] = ["sled", "sled.rebuilt"];
-
-/// Replayed events between two flushes.
-const REPLAY_FLUSH: u64 = 256;
 
 impl Store {
     /// Opens or creates a data directory. Damaged records are rebuilt from the catalogue log and the stored files,
@@ -159,7 +154,7 @@ impl Parts<'_> {
 fn prepare(path: &Path, failure: &Failure) -> Result<File, StoreError> {
     let fail = |e: std::io::Error| StoreError::io(format!("open the data directory {}", path.display()), &e);
     let has = |name: &str| path.join(name).exists();
-    let new = !RECORDS.into_iter().chain([LOG, "format"]).any(has);
+    let new = !has_records(path) && !has(LOG) && !has("format");
     if new {
         // Said before anything is made, so that nothing half-made is left.
         let place = path.ancestors().find(|p| p.is_dir()).unwrap_or(Path::new("."));
@@ -197,7 +192,7 @@ fn prepare(path: &Path, failure: &Failure) -> Result<File, StoreError> {
             done => done?,
         }
     }
-    if !RECORDS.into_iter().chain([LOG]).any(has) {
+    if !has_records(path) && !has(LOG) {
         // Before the engine, so that a first start that is cut off leaves a log to begin again from.
         CatalogueLog::open(&path.join(LOG), 0)?;
     }
@@ -212,8 +207,7 @@ fn prepare(path: &Path, failure: &Failure) -> Result<File, StoreError> {
 /// A directory with stored files but neither records nor a line of the log has lost its catalogue. Starting empty would
 /// remove the files as unreferenced.
 fn refuse_to_forget(path: &Path) -> Result<(), StoreError> {
-    let has = |name: &str| path.join(name).exists();
-    if has_originals(path) && !RECORDS.into_iter().any(has) && is_empty(&path.join(LOG)) {
+    if has_originals(path) && !has_records(path) && is_empty(&path.join(LOG)) {
         return Err(StoreError::damaged(
             format!("the data directory {}", path.display()),
             "there are stored files, but 'sled' is gone and 'catalogue.log' is gone or empty; put one of them back, \
@@ -221,16 +215,6 @@ fn refuse_to_forget(path: &Path) -> Result<(), StoreError> {
         ));
     }
     Ok(())
-}
-
-/// Whether there are uploaded files.
-pub(super) fn has_originals(data: &Path) -> bool {
-    std::fs::read_dir(data.join("originals")).is_ok_and(|mut d| d.next().is_some())
-}
-
-/// Whether a file is missing or has no contents.
-pub(super) fn is_empty(file: &Path) -> bool {
-    std::fs::metadata(file).map_or(true, |file| file.len() == 0)
 }
 
 impl Writer {
@@ -274,33 +258,6 @@ pub(super) fn settle(
         sequence = rewrite_log(backend, &mut log, sequence.max(scan.last))?;
     }
     Ok(Writer { log, sequence })
-}
-
-fn sequence(backend: &dyn Backend) -> Result<u64, StoreError> {
-    let sequence: Option<Number> = get(backend, keys::META_SEQUENCE)?;
-    Ok(sequence.map_or(0, |n| n.0))
-}
-
-/// Applies the events of the log the records have not seen. Returns what the log holds and how many were applied.
-pub(super) fn replay(backend: &dyn Backend, log: &Path) -> Result<(LogScan, u64), StoreError> {
-    let applied = sequence(backend)?;
-    let mut replayed = 0;
-    let scan = catalogue_log::read(log, |number, event| {
-        if number > applied {
-            let mut batch = event::stage(backend, &event)?;
-            put(&mut batch, keys::META_SEQUENCE.to_vec(), &Number(number))?;
-            backend.apply(&batch)?;
-            replayed += 1;
-            if replayed % REPLAY_FLUSH == 0 {
-                backend.flush()?;
-            }
-        }
-        Ok(())
-    })?;
-    if replayed > 0 {
-        backend.flush()?;
-    }
-    Ok((scan, replayed))
 }
 
 /// Writes the log anew from the records and returns the last event's number. Restoring what is there changes nothing,

@@ -3,40 +3,17 @@
 //! The name is the BLAKE3 hash of the contents, so every reader can tell whether a file is what was uploaded, and every
 //! reader does.
 
-use super::{Store, StoreError, files, keys};
+use super::layout::ORIGINALS;
+use super::{OriginalDamage, Store, StoreError, files, keys};
 use crate::model::ContentHash;
-use std::fmt;
 use std::fs::File;
 use std::io::{ErrorKind, Read, Seek};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::PoisonError;
 
-/// The directory of all stored files, inside the data directory.
-pub(super) const DIRECTORY: &str = "originals";
 /// Bytes read between two looks at whether to go on.
 const PIECE: usize = 256 << 10;
-
-/// What is wrong with a stored file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum OriginalDamage {
-    /// It is gone.
-    Missing,
-    /// Its contents are not those that were uploaded.
-    Changed,
-    /// The disk fails to read it.
-    Unreadable,
-}
-
-impl fmt::Display for OriginalDamage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Missing => "is missing",
-            Self::Changed => "does not hold what was uploaded",
-            Self::Unreadable => "cannot be read",
-        })
-    }
-}
 
 /// A stored file whose contents were checked, open at its beginning.
 #[derive(Debug)]
@@ -51,7 +28,7 @@ impl Store {
     /// Where a stored file lies. It may be missing.
     pub fn original_path(&self, content: ContentHash) -> PathBuf {
         let name = content.to_string();
-        self.inner.path.join(DIRECTORY).join(&name[..2]).join(name)
+        self.inner.path.join(ORIGINALS).join(&name[..2]).join(name)
     }
 
     /// A stored file in memory.

@@ -6,8 +6,9 @@
 use super::backend::{Backend, Batch, Entry};
 use super::event::{files_of, get};
 use super::failure::Failure;
-use super::open::{LOG, has_originals, is_empty, replay};
+use super::layout::{LOG, REBUILT, RECORDS, has_originals, is_empty};
 use super::payload::Number;
+use super::replay::replay;
 use super::sled_backend::SledBackend;
 use super::{StoreError, StoreOptions, files, keys, migrate, record};
 use crate::model::Generation;
@@ -36,9 +37,9 @@ pub(super) fn open_records(
     failure: &Arc<Failure>,
     recovery: &mut Vec<String>,
 ) -> Result<SledBackend, StoreError> {
-    let sled = data.join("sled");
+    let sled = data.join(RECORDS);
     remove_directory(&data.join("sled.rebuilding"))?;
-    if data.join("sled.rebuilt").exists() {
+    if data.join(REBUILT).exists() {
         put_in_place(data, recovery)?;
     }
     let (damage, salvaged) = match SledBackend::open(&sled, options.cache_bytes, failure.clone()) {
@@ -132,7 +133,7 @@ fn rebuild(
     drop_broken_links(&backend, recovery)?;
     report_missing_files(data, &backend, recovery)?;
     drop(backend);
-    rename(&building, &data.join("sled.rebuilt"))?;
+    rename(&building, &data.join(REBUILT))?;
     files::sync_directory(data)
 }
 
@@ -189,13 +190,13 @@ fn report_missing_files(
 
 /// Moves `sled` aside and `sled.rebuilt` into its place.
 fn put_in_place(data: &Path, recovery: &mut Vec<String>) -> Result<(), StoreError> {
-    let sled = data.join("sled");
+    let sled = data.join(RECORDS);
     if sled.exists() {
         let aside = format!("sled.damaged-{}", Timestamp::now().as_millisecond());
         rename(&sled, &data.join(&aside))?;
         recovery.push(format!("the damaged records are kept in '{aside}'"));
     }
-    rename(&data.join("sled.rebuilt"), &sled)?;
+    rename(&data.join(REBUILT), &sled)?;
     files::sync_directory(data)
 }
 

@@ -3,7 +3,7 @@
 
 use super::backend::{Backend, Batch, Entry};
 use super::failure::Failure;
-use super::open::LOG;
+use super::layout::LOG;
 use super::sled_backend::SledBackend;
 use super::standby::Standby;
 use super::{StoreError, StoreOptions, rebuild};

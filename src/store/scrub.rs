@@ -1,7 +1,7 @@
 //! A look at everything that is stored: every uploaded file against its hash, every record and every line of the
 //! catalogue log against its checksum. What is found is kept as [`Store::damage`]; nothing is changed.
 
-use super::open::LOG;
+use super::layout::LOG;
 use super::{Store, StoreError, catalogue_log, files, keys, record};
 use crate::model::ContentHash;
 use jiff::Timestamp;

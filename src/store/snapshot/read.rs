@@ -5,8 +5,9 @@
 
 use super::super::backend::{Backend, Batch, Entry};
 use super::super::failure::Failure;
+use super::super::layout::{ORIGINALS, RECORDS as ENGINE};
 use super::super::sled_backend::SledBackend;
-use super::super::{StoreError, StoreOptions, files, originals, record};
+use super::super::{StoreError, StoreOptions, files, record};
 use super::manifest::{CHECKSUM, MANIFEST, MAX_BYTES, Manifest, Member, RECORDS};
 use super::write::Hashing;
 use crate::model::{ContentHash, Snapshot};
@@ -59,11 +60,11 @@ pub(super) fn unpack(
     let records = into.join(RECORDS);
     let mut entry = next(&mut entries, RECORDS, Some(manifest.records.bytes))?;
     save(&mut entry, &records, &manifest.records)?;
-    let directory = into.join(originals::DIRECTORY);
+    let directory = into.join(ORIGINALS);
     make(&directory)?;
     for member in &manifest.originals {
         let name = member.hash.to_string();
-        let path = format!("{}/{name}", originals::DIRECTORY);
+        let path = format!("{}/{name}", ORIGINALS);
         let mut entry = next(&mut entries, &path, Some(member.bytes))?;
         let folder = directory.join(&name[..2]);
         make(&folder)?;
@@ -80,7 +81,7 @@ pub(super) fn unpack(
         return Err(StoreError::bad_snapshot("something follows its end"));
     }
     sync_folders(&directory)?;
-    load(&records, &into.join("sled"), options)?;
+    load(&records, &into.join(ENGINE), options)?;
     files::remove(&records)?;
     Ok(manifest)
 }

@@ -4,8 +4,8 @@
 //! the restored state is the one that counts: whoever finds `restore.ready`, moves its parts into place and those they
 //! replace to `restore.replaced`, which goes at the end.
 
-use super::super::open::LOG;
-use super::super::{StoreError, files, originals};
+use super::super::layout::{LOG, ORIGINALS, RECORDS};
+use super::super::{StoreError, files};
 use std::path::{Path, PathBuf};
 
 pub(super) const UNPACKING: &str = "restore.unpacking";
@@ -13,7 +13,7 @@ const READY: &str = "restore.ready";
 const REPLACED: &str = "restore.replaced";
 
 /// What is switched. The cached signatures stay: they are named by what they were computed from.
-const PARTS: [&str; 3] = ["sled", LOG, originals::DIRECTORY];
+const PARTS: [&str; 3] = [RECORDS, LOG, ORIGINALS];
 
 /// Makes the checked state the one that counts.
 pub(super) fn declare_ready(data: &Path) -> Result<(), StoreError> {

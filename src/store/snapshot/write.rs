@@ -1,8 +1,9 @@
 //! Making a snapshot.
 
 use super::super::event::get;
+use super::super::layout::ORIGINALS;
 use super::super::payload::Number;
-use super::super::{Store, StoreError, files, keys, migrate, originals};
+use super::super::{Store, StoreError, files, keys, migrate};
 use super::manifest::{ARRANGEMENT, CHECKSUM, MANIFEST, Manifest, Member, RECORDS};
 use crate::model::{ContentHash, Generation, Snapshot, SnapshotId, SnapshotOrigin};
 use jiff::Timestamp;
@@ -189,7 +190,7 @@ impl Store {
         for member in &manifest.originals {
             let file = File::open(self.original_path(member.hash)).map_err(fail)?;
             let mut reader = Hashing::new(BufReader::new(file));
-            let name = format!("{}/{}", originals::DIRECTORY, member.hash);
+            let name = format!("{}/{}", ORIGINALS, member.hash);
             append(
                 &mut archive,
                 &name,
