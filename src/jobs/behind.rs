@@ -15,6 +15,18 @@ pub(super) struct Behind {
     relearn: bool,
 }
 
+impl Behind {
+    /// Refuses new jobs while the old ones are not known.
+    pub(super) fn require_read(self) -> Result<(), StoreError> {
+        match self.unread {
+            false => Ok(()),
+            true => Err(StoreError::Full {
+                detail: "the jobs are read once there is space".to_owned(),
+            }),
+        }
+    }
+}
+
 impl Inner {
     /// Reads the index and the jobs, or remembers to do so where the disk is too full to read them.
     pub(super) fn read_or_put_off(&self) -> Result<(), JobError> {

@@ -28,6 +28,7 @@ impl From<StoreError> for ReindexError {
         let code = match &error {
             StoreError::Full { .. } => "storage_full",
             StoreError::ReadOnly { .. } => "storage_read_only",
+            StoreError::Denied { .. } => "storage_denied",
             StoreError::Damaged { .. } => "storage_damaged",
             _ => "storage_failed",
         };

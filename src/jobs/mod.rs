@@ -233,6 +233,7 @@ impl Jobs {
         if state.paused {
             return Err(JobError::Paused);
         }
+        state.behind.require_read()?;
         if state.waiting.len() >= limit {
             return Err(JobError::QueueFull { limit });
         }
