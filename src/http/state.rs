@@ -7,7 +7,7 @@ use super::config::ServiceConfig;
 use super::keyring::Keyring;
 use super::limits::Limits;
 use super::problem::Problem;
-use super::{metrics, openapi, problem_from, recovery_mode};
+use super::{audit, metrics, openapi, problem_from, recovery_mode};
 use crate::jobs::{JobError, Jobs};
 use crate::memory::MemoryBudget;
 use crate::store::{Damage, Health, Store, StoreError};
@@ -40,9 +40,6 @@ pub enum OpenError {
         /// Its data directory.
         data: std::path::PathBuf,
     },
-    /// The audit log cannot be written.
-    #[error("the audit log could not be opened: {0}")]
-    Audit(std::io::Error),
     /// The API's document could not be written.
     #[error("the OpenAPI document could not be written: {0}")]
     Document(String),
@@ -153,7 +150,10 @@ impl AppState {
                 tracing::warn!(%error, "the audit log cannot be opened yet");
                 Audit::later(&config.data_dir)
             }
-            opened => opened.map_err(OpenError::Audit)?,
+            opened => opened.map_err(|error| {
+                let path = config.data_dir.join(audit::FILE);
+                StoreError::io(format!("open the audit log {}", path.display()), &error)
+            })?,
         };
         if store.recovery_mode().is_none()
             && let Some(why) = recovery_mode::reason(&config, &store)

@@ -142,8 +142,6 @@ fn a_read_only_mount_is_shown_in_recovery_mode() {
     let original = writable.join("data");
     std::fs::rename(directory.path().join("data"), &original).unwrap();
     std::fs::create_dir(directory.path().join("data")).unwrap();
-    let live = Service::start(&writable, &[]);
-    live.kill();
     {
         let service = Service::start(&writable, &[]);
         let client = Client::new(&service.url);
@@ -285,4 +283,25 @@ fn files_that_may_not_be_used_are_a_problem_of_their_own() {
         .unwrap();
     assert_eq!(upload.status, 201, "{}", upload.text());
     service.kill();
+}
+
+#[test]
+fn an_audit_log_that_may_not_be_written_is_named() {
+    let directory = place();
+    if !can_run("an_audit_log_that_may_not_be_written_is_named", directory.path()) {
+        return;
+    }
+    fill(directory.path());
+    let log = directory.path().join("data/audit.log");
+    set(&log, 0o400);
+    let Err(status) = Service::try_start(spawn(directory.path(), &[])) else {
+        panic!("it started without an audit log");
+    };
+    let said = tail(directory.path());
+    let said = said.lines().last().unwrap();
+    assert_eq!(status.code(), Some(1));
+    assert!(
+        said.contains(log.to_str().unwrap()) && said.contains("give the user"),
+        "{said}"
+    );
 }

@@ -242,3 +242,48 @@ fn a_changed_or_missing_file_is_found() {
         Err(StoreError::Original { .. })
     ));
 }
+
+/// Every file below a directory with its contents.
+fn files(directory: &Path) -> std::collections::BTreeMap<std::path::PathBuf, Vec<u8>> {
+    let mut found = std::collections::BTreeMap::new();
+    for entry in std::fs::read_dir(directory).unwrap().flatten() {
+        if entry.path().is_dir() {
+            found.extend(files(&entry.path()));
+        } else {
+            found.insert(entry.path(), std::fs::read(entry.path()).unwrap());
+        }
+    }
+    found
+}
+
+#[test]
+fn a_directory_opened_read_only_shows_the_catalogue_and_writes_nothing() {
+    let directory = TempDir::new().unwrap();
+    let (before, job) = filled(directory.path());
+    let on_disk = files(directory.path());
+    let denied = || StoreError::Denied {
+        what: "open the data directory".to_owned(),
+        detail: "read-only".to_owned(),
+    };
+    // Held by another process, as a directory that is mounted twice: no lock is needed.
+    let lock = std::fs::File::open(directory.path().join("lock")).unwrap();
+    lock.lock().unwrap();
+    let store = Store::open_read_only(directory.path(), denied()).unwrap();
+    assert_eq!(catalogue(&store), before);
+    assert!(store.recovery_mode().unwrap().contains("cannot be written"));
+    let refused = |error: StoreError| matches!(error, StoreError::RecoveryMode { .. });
+    assert!(refused(store.create_class(name("new")).unwrap_err()));
+    assert!(refused(store.put_job(&job).unwrap_err()));
+    assert!(refused(store.recover().unwrap_err()));
+    // What the log does not hold is refused, never missing.
+    assert!(refused(store.job(job.id).unwrap_err()));
+    assert!(refused(store.list_jobs(None, 10).unwrap_err()));
+    assert!(refused(store.generation().unwrap_err()));
+    drop(store);
+    assert!(files(directory.path()) == on_disk);
+    std::fs::remove_file(directory.path().join("catalogue.log")).unwrap();
+    let Err(error) = Store::open_read_only(directory.path(), denied()) else {
+        panic!("shown without a log");
+    };
+    assert_eq!(error, denied());
+}

@@ -195,8 +195,10 @@ async fn receive(state: &AppState, request: Request, limit: u64) -> Result<std::
     let directory = state.config.data_dir.clone();
     let file = state
         .blocking(move |_| {
-            tempfile::tempfile_in(directory)
-                .map_err(|e| Problem::from(StoreError::io("receive a snapshot", &e)))
+            tempfile::tempfile_in(&directory).map_err(|e| {
+                let what = format!("receive a snapshot into {}", directory.display());
+                Problem::from(StoreError::io(what, &e))
+            })
         })
         .await?;
     let mut file = tokio::fs::File::from_std(file);
