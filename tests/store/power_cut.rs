@@ -61,11 +61,8 @@ fn small_files_that_were_cut_do_not_keep_the_store_from_starting() {
             assert_eq!(store.health(), shapelex::store::Health::Ready, "{file} {what}");
             drop(store);
             if file == "format" {
-                assert_eq!(
-                    std::fs::read(&path).unwrap(),
-                    whole,
-                    "{file} {what} is written anew"
-                );
+                let text = std::fs::read_to_string(&path).unwrap();
+                assert_eq!(text.trim(), "1", "{file} {what} is written anew");
             }
         }
         std::fs::remove_file(&path).unwrap();
