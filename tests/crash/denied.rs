@@ -17,7 +17,7 @@ const NOBODY: u32 = 65534;
 fn is_root(directory: &Path) -> bool {
     let probe = directory.join("probe");
     std::fs::write(&probe, b"").unwrap();
-    std::fs::set_permissions(&probe, Permissions::from_mode(0)).unwrap();
+    std::fs::set_permissions(&probe, Permissions::from_mode(0o000)).unwrap();
     let root = std::fs::read(&probe).is_ok();
     std::fs::remove_file(&probe).unwrap();
     root
