@@ -4,8 +4,10 @@ use super::admission::{Compute, ComputeOptions};
 use super::audit::Audit;
 use super::auth;
 use super::config::ServiceConfig;
+use super::connections::Connections;
 use super::keyring::Keyring;
 use super::limits::Limits;
+use super::local_access::LocalToken;
 use super::problem::Problem;
 use super::{metrics, openapi, recovery_mode};
 use crate::jobs::{JobError, Jobs};
@@ -14,7 +16,6 @@ use crate::store::{Health, Store, StoreError};
 use std::net::SocketAddr;
 use std::ops::Deref;
 use std::sync::{Arc, Mutex};
-use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 /// Why the service did not start.
@@ -43,6 +44,9 @@ pub enum OpenError {
     /// The audit log cannot be written.
     #[error("the audit log could not be opened: {0}")]
     Audit(std::io::Error),
+    /// The system gives no randomness.
+    #[error("there is no randomness for the local token: {0}")]
+    Randomness(rand::rand_core::OsError),
     /// The API's document could not be written.
     #[error("the OpenAPI document could not be written: {0}")]
     Document(String),
@@ -64,8 +68,10 @@ pub struct Parts {
     pub limits: Limits,
     /// Who changed what.
     pub audit: Audit,
-    /// Places for connections.
-    pub connections: Arc<Semaphore>,
+    /// The connections there are.
+    pub connections: Arc<Connections>,
+    /// Lets the owner of the data directory in while there is no key.
+    pub local_token: LocalToken,
     /// The job queue and the live index.
     pub jobs: Jobs,
     /// Where requests compute.
@@ -149,9 +155,8 @@ impl AppState {
             keys,
             limits: Limits::new(config.key_limits),
             audit,
-            connections: Arc::new(Semaphore::new(
-                config.max_connections.clamp(1, Semaphore::MAX_PERMITS),
-            )),
+            connections: Arc::new(Connections::new(config.connection_limits())),
+            local_token: LocalToken::new().map_err(OpenError::Randomness)?,
             jobs,
             compute,
             catalogue: Mutex::new(()),

@@ -1,5 +1,6 @@
 //! Why the store could not do what it was asked.
 
+use super::usage::Quota;
 use crate::model::{ClassId, ClassName, JobId, KeyId, KeyName, ShapeId, SnapshotId};
 use std::path::PathBuf;
 
@@ -67,6 +68,24 @@ pub enum StoreError {
         /// What is wrong with it.
         detail: String,
     },
+    /// An API key may have no more of something. Nothing was changed.
+    #[error("the API key may have {limit} {quota}; it has {used}, and this would add {more}")]
+    QuotaExceeded {
+        /// What there may be no more of.
+        quota: Quota,
+        /// The most there may be.
+        limit: u64,
+        /// What there is.
+        used: u64,
+        /// What would be added.
+        more: u64,
+    },
+    /// The process has as many files open as it may. Nothing was changed.
+    #[error("no more files can be opened at the moment: {what}")]
+    OutOfDescriptors {
+        /// What was being done.
+        what: String,
+    },
     /// The disk is full. Nothing was changed.
     #[error("the disk is full: {detail}")]
     Full {
@@ -122,9 +141,12 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    /// Wraps a file system error, telling a full disk apart.
+    /// Wraps a file system error, telling a full disk and a want of file descriptors apart.
     pub(crate) fn io(what: impl Into<String>, error: &std::io::Error) -> Self {
         let what = what.into();
+        if is_out_of_descriptors(error) {
+            return Self::OutOfDescriptors { what };
+        }
         match error.kind() {
             std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
                 Self::Full { detail: what }
@@ -148,4 +170,11 @@ impl StoreError {
             detail: detail.into(),
         }
     }
+}
+
+/// Whether the process (`EMFILE`) or the system (`ENFILE`) has as many files open as it may.
+pub(crate) fn is_out_of_descriptors(error: &std::io::Error) -> bool {
+    const ENFILE: i32 = 23;
+    const EMFILE: i32 = 24;
+    cfg!(unix) && matches!(error.raw_os_error(), Some(ENFILE | EMFILE))
 }

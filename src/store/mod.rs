@@ -50,7 +50,7 @@ pub use garbage::Garbage;
 pub use idempotency::Remembered;
 pub use memory_backend::MemoryBackend;
 pub use migrate::FORMAT;
-pub use usage::Usage;
+pub use usage::{Maker, Quota, Usage};
 
 use backend::Batch;
 use catalogue_log::CatalogueLog;
