@@ -131,6 +131,9 @@ fn identify(parts: &Parts, headers: &HeaderMap) -> Result<Arc<ApiKey>, &'static 
     let secret = presented(headers).ok_or(
         "send an API key, as 'Authorization: Bearer slx_…' or 'X-API-Key: slx_…'; `shapelex keys create` makes one",
     )?;
+    if parts.local_token.is(secret) {
+        return Err("there is an API key, so the local token opens nothing; send a key of scope 'admin'");
+    }
     let key = parts
         .keys
         .find(secret)

@@ -27,7 +27,10 @@ pub enum OpenError {
     /// The job queue could not be started.
     #[error(transparent)]
     Jobs(#[from] JobError),
-    /// The system gives no threads.
+    /// The system gives no threads for answering.
+    #[error("the service's threads could not be started: {0}")]
+    Runtime(std::io::Error),
+    /// The system gives no threads for queries.
     #[error("the query threads could not be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// Anyone could use it.

@@ -7,12 +7,15 @@ use crate::mesh::{self, Companion, Format, Limits, Source, TriangleSoup};
 use crate::model::{ContentHash, FailedShape, Shape};
 use crate::parameters::Parameters;
 use crate::pipeline::{Description, PipelineError, StageSpan, describe_shape};
-use crate::store::Store;
+use crate::store::{Store, StoreError};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// The code of a file that could not be opened because too many are.
+const OUT_OF_DESCRIPTORS: &str = "out_of_descriptors";
 
 /// Why a shape has no description.
 #[derive(Clone, Debug)]
@@ -27,6 +30,11 @@ impl Failure {
             code,
             detail: detail.into(),
         }
+    }
+
+    /// Whether the same shape may well be described a moment later.
+    pub(super) fn is_passing(&self) -> bool {
+        self.code == OUT_OF_DESCRIPTORS
     }
 
     pub(super) fn of(&self, shape: &Shape) -> FailedShape {
@@ -115,8 +123,13 @@ impl Describer<'_> {
         if self.cancel.is_cancelled() {
             return Err(ReindexError::Cancelled);
         }
+        let failures = failures.into_inner().unwrap_or_default();
+        // The file is fine; without it the class would be learnt from less than it has.
+        if let Some(failure) = failures.values().find(|failure| failure.is_passing()) {
+            return Err(ReindexError::Later(failure.detail.clone()));
+        }
         Ok(Described {
-            failures: failures.into_inner().unwrap_or_default(),
+            failures,
             computed: computed.into_inner(),
             cached: cached.into_inner(),
         })
@@ -154,7 +167,10 @@ impl Describer<'_> {
         let load = |content| {
             self.store
                 .original(content)
-                .map_err(|e| Failure::new("file_unreadable", e.to_string()))
+                .map_err(|e| match e {
+                    StoreError::OutOfDescriptors { .. } => Failure::new(OUT_OF_DESCRIPTORS, e.to_string()),
+                    other => Failure::new("file_unreadable", other.to_string()),
+                })
         };
         let bytes = load(shape.content)?;
         let companions = shape

@@ -84,6 +84,8 @@ struct State {
     unwritten: Vec<Job>,
     /// Whether jobs are refused because the store as a whole is being changed.
     paused: bool,
+    /// No job is begun before this moment.
+    not_before: Option<Instant>,
     stopping: bool,
     stopped: bool,
 }

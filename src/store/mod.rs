@@ -33,6 +33,7 @@ mod open;
 mod originals;
 mod payload;
 mod payload_jobs;
+mod private;
 mod rebuild;
 pub mod record;
 mod recover;

@@ -5,7 +5,7 @@ use super::catalogue_log::{self, CatalogueLog, LogScan};
 use super::event::{self, Event, get, put, shapes_of};
 use super::failure::Failure;
 use super::payload::Number;
-use super::{Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, rebuild, snapshot};
+use super::{Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, private, rebuild, snapshot};
 use crate::model::Class;
 use std::fs::{File, TryLockError};
 use std::path::Path;
@@ -52,8 +52,12 @@ impl Store {
 /// Makes the directory, takes its lock and checks its format.
 fn prepare(path: &Path) -> Result<File, StoreError> {
     let fail = |e: std::io::Error| StoreError::io(format!("open the data directory {}", path.display()), &e);
-    std::fs::create_dir_all(path).map_err(fail)?;
-    let lock = File::create(path.join("lock")).map_err(fail)?;
+    if let Some(parent) = path.parent().filter(|_| !path.exists()) {
+        std::fs::create_dir_all(parent).map_err(fail)?;
+    }
+    files::create_directory(path).map_err(fail)?;
+    let mut lock = files::options();
+    let lock = lock.write(true).create(true).truncate(false).open(path.join("lock")).map_err(fail)?;
     match lock.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
@@ -63,6 +67,7 @@ fn prepare(path: &Path) -> Result<File, StoreError> {
         }
         Err(TryLockError::Error(error)) => return Err(fail(error)),
     }
+    private::close_to_others(path)?;
     snapshot::finish_restore(path)?;
     let format = migrate::check_format(path)?;
     refuse_to_forget(path, format.is_some())?;
@@ -100,6 +105,7 @@ fn finish(
     mut recovery: Vec<String>,
 ) -> Result<Store, StoreError> {
     let writer = settle(path, &*backend, &mut recovery)?;
+    private::close_to_others(path)?;
     for line in &recovery {
         tracing::warn!(line, "recovered");
     }
