@@ -69,7 +69,11 @@ impl TargetArgs {
         match access().filter(|access| access.url.starts_with("http://")) {
             None => Err(CliError::Failed(locked.to_string())),
             Some(access) => {
-                eprintln!("shapelex: a service runs on {}; asking it at {}", data.display(), access.url);
+                eprintln!(
+                    "shapelex: a service runs on {}; asking it at {}",
+                    data.display(),
+                    access.url
+                );
                 Ok(Client::remote(&access.url)?.with_key(self.api_key.clone().or(Some(access.token))))
             }
         }
@@ -81,7 +85,10 @@ fn same_place(one: &str, other: &str) -> bool {
     let place = |url: &str| {
         let uri: Uri = url.trim_end_matches('/').parse().ok()?;
         let host = canonical(uri.host()?);
-        let loopback = host == "localhost" || host.parse::<IpAddr>().is_ok_and(|ip| ip.to_canonical().is_loopback());
+        let loopback = host == "localhost"
+            || host
+                .parse::<IpAddr>()
+                .is_ok_and(|ip| ip.to_canonical().is_loopback());
         let host = if loopback { "localhost".to_owned() } else { host };
         Some((uri.scheme_str()?.to_owned(), host, uri.port_u16()))
     };
@@ -316,10 +323,20 @@ mod tests {
     #[test]
     fn the_token_goes_to_the_service_that_wrote_it_only() {
         let written = "http://127.0.0.1:7345";
-        for same in ["http://127.0.0.1:7345", "http://localhost:7345/", "http://[::1]:7345"] {
+        for same in [
+            "http://127.0.0.1:7345",
+            "http://localhost:7345/",
+            "http://[::1]:7345",
+        ] {
             assert!(same_place(written, same), "{same}");
         }
-        for other in ["http://127.0.0.1:7346", "http://10.0.0.1:7345", "http://localhost", "https://127.0.0.1:7345", "x"] {
+        for other in [
+            "http://127.0.0.1:7346",
+            "http://10.0.0.1:7345",
+            "http://localhost",
+            "https://127.0.0.1:7345",
+            "x",
+        ] {
             assert!(!same_place(written, other), "{other}");
         }
         assert!(same_place("http://10.0.0.1:80", "http://10.0.0.1:80"));

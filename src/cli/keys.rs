@@ -151,7 +151,9 @@ fn row(key: &Value) -> Vec<String> {
 
 fn revoke(args: &RevokeArgs, json: bool) -> Result<(), CliError> {
     let path = format!("/v1/keys/{}", encode(&args.key));
-    args.target.operator_client()?.call("DELETE", &path, Payload::Empty)?;
+    args.target
+        .operator_client()?
+        .call("DELETE", &path, Payload::Empty)?;
     if json {
         output::json(&json!({ "revoked": args.key }))
     } else {

@@ -144,7 +144,9 @@ impl Table {
     /// Asks the connection that is idle longest to leave, of all or of an address. Says whether there was one.
     fn dismiss_oldest(&mut self, address: Option<IpAddr>) -> bool {
         let candidates = self.open.values_mut().filter_map(|open| match open.state {
-            State::Idle(since) if address.is_none_or(|address| open.address == address) => Some((since, open)),
+            State::Idle(since) if address.is_none_or(|address| open.address == address) => {
+                Some((since, open))
+            }
             _ => None,
         });
         let Some((_, oldest)) = candidates.min_by_key(|(since, _)| *since) else {
@@ -171,7 +173,10 @@ impl Place {
     /// Whether a request is being answered.
     pub fn is_busy(&self) -> bool {
         let table = self.connections.table();
-        table.open.get(&self.id).is_some_and(|open| open.state == State::Busy)
+        table
+            .open
+            .get(&self.id)
+            .is_some_and(|open| open.state == State::Busy)
     }
 
     fn set(&self, state: impl FnOnce(u64) -> State) {
@@ -187,7 +192,8 @@ impl Drop for Busy {
     fn drop(&mut self) {
         // One that was asked to leave and had a request on its way stays on the way out.
         let leaving = self.0.leave.is_cancelled();
-        self.0.set(|now| if leaving { State::Leaving } else { State::Idle(now) });
+        self.0
+            .set(|now| if leaving { State::Leaving } else { State::Idle(now) });
         self.0.connections.changed.notify_waiters();
     }
 }
@@ -264,9 +270,15 @@ mod tests {
         let busy = place.begin();
         let waiting = connections.admit(ip("10.0.0.2"));
         tokio::pin!(waiting);
-        assert!(tokio::time::timeout(Duration::from_millis(30), &mut waiting).await.is_err());
+        assert!(
+            tokio::time::timeout(Duration::from_millis(30), &mut waiting)
+                .await
+                .is_err()
+        );
         drop(busy);
-        let admitted = tokio::time::timeout(Duration::from_secs(5), waiting).await.unwrap();
+        let admitted = tokio::time::timeout(Duration::from_secs(5), waiting)
+            .await
+            .unwrap();
         assert!(admitted.is_some() && place.leave.is_cancelled());
     }
 }

@@ -81,7 +81,10 @@ fn misdirected(host: &str) -> Problem {
 
 /// In lower case, without the brackets of an IPv6 address and the dot at the end of a full name.
 pub fn canonical(host: &str) -> String {
-    let host = host.strip_prefix('[').and_then(|h| h.strip_suffix(']')).unwrap_or(host);
+    let host = host
+        .strip_prefix('[')
+        .and_then(|h| h.strip_suffix(']'))
+        .unwrap_or(host);
     host.strip_suffix('.').unwrap_or(host).to_ascii_lowercase()
 }
 
@@ -128,14 +131,30 @@ mod tests {
         let own = |config: &ServiceConfig, host: &str| goes_by(config, &canonical(host));
         let local = config("127.0.0.1:7345", &["shapes.example", "[fd00::7]"]);
         for host in [
-            "localhost", "LocalHost.", "127.0.0.1", "127.9.9.9", "[::1]", "[::ffff:127.0.0.1]", "Shapes.Example",
-            "shapes.example.", "[FD00::7]",
+            "localhost",
+            "LocalHost.",
+            "127.0.0.1",
+            "127.9.9.9",
+            "[::1]",
+            "[::ffff:127.0.0.1]",
+            "Shapes.Example",
+            "shapes.example.",
+            "[FD00::7]",
         ] {
             assert!(own(&local, host), "{host}");
         }
         for host in [
-            "evil.test", "localhost.evil.test", "127.0.0.1.evil.test", "10.0.0.1", "0.0.0.0", "[::]", "", "example",
-            "x.shapes.example", "localhost..", "2130706433",
+            "evil.test",
+            "localhost.evil.test",
+            "127.0.0.1.evil.test",
+            "10.0.0.1",
+            "0.0.0.0",
+            "[::]",
+            "",
+            "example",
+            "x.shapes.example",
+            "localhost..",
+            "2130706433",
         ] {
             assert!(!own(&local, host), "{host}");
         }

@@ -104,7 +104,10 @@ mod tests {
 
     #[test]
     fn secrets_are_long_and_differ() {
-        let (a, b) = (new_secret(SECRET_PREFIX).unwrap(), new_secret(SECRET_PREFIX).unwrap());
+        let (a, b) = (
+            new_secret(SECRET_PREFIX).unwrap(),
+            new_secret(SECRET_PREFIX).unwrap(),
+        );
         assert_eq!((a.len(), &a[..4]), (47, "slx_"));
         assert_ne!(a, b);
     }

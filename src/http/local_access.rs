@@ -51,7 +51,10 @@ impl LocalToken {
 
     /// Whether a request brought this token. Takes the same time wherever the two differ.
     pub fn is(&self, presented: &str) -> bool {
-        KeyHash::of(presented).to_bytes().ct_eq(&self.hash.to_bytes()).into()
+        KeyHash::of(presented)
+            .to_bytes()
+            .ct_eq(&self.hash.to_bytes())
+            .into()
     }
 
     /// Writes the file, readable by its owner only, in place of one that an earlier run left.
@@ -109,15 +112,21 @@ mod tests {
     fn the_file_has_the_token_and_is_its_owners_alone() {
         let directory = tempfile::tempdir().unwrap();
         let (old, token) = (LocalToken::new().unwrap(), LocalToken::new().unwrap());
-        old.publish(directory.path(), "http://127.0.0.1:1".to_owned()).unwrap();
-        token.publish(directory.path(), "http://127.0.0.1:2".to_owned()).unwrap();
+        old.publish(directory.path(), "http://127.0.0.1:1".to_owned())
+            .unwrap();
+        token
+            .publish(directory.path(), "http://127.0.0.1:2".to_owned())
+            .unwrap();
         let access = LocalAccess::read(directory.path()).unwrap();
         assert!(token.is(&access.token) && !old.is(&access.token) && !token.is(""));
         assert_eq!(access.url, "http://127.0.0.1:2");
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
-            let mode = std::fs::metadata(directory.path().join(FILE)).unwrap().permissions().mode();
+            let mode = std::fs::metadata(directory.path().join(FILE))
+                .unwrap()
+                .permissions()
+                .mode();
             assert_eq!(mode & 0o777, 0o600);
         }
         LocalAccess::remove(directory.path()).unwrap();
@@ -127,8 +136,14 @@ mod tests {
 
     #[test]
     fn a_wildcard_address_is_reached_by_loopback() {
-        assert_eq!(local_url("0.0.0.0:7".parse().unwrap(), false), "http://127.0.0.1:7");
+        assert_eq!(
+            local_url("0.0.0.0:7".parse().unwrap(), false),
+            "http://127.0.0.1:7"
+        );
         assert_eq!(local_url("[::]:7".parse().unwrap(), true), "https://[::1]:7");
-        assert_eq!(local_url("10.0.0.5:7".parse().unwrap(), false), "http://10.0.0.5:7");
+        assert_eq!(
+            local_url("10.0.0.5:7".parse().unwrap(), false),
+            "http://10.0.0.5:7"
+        );
     }
 }

@@ -284,7 +284,13 @@ fn problems_of(operation: &str) -> Vec<Code> {
         "restore_upload" => [
             WRITE,
             RESTORE,
-            &[EmptyBody, InvalidRequest, RequestTimeout, BodyTooLarge, UnsupportedMediaType],
+            &[
+                EmptyBody,
+                InvalidRequest,
+                RequestTimeout,
+                BodyTooLarge,
+                UnsupportedMediaType,
+            ],
         ]
         .concat(),
         "query_batch" => [UPLOAD, &[IndexEmpty, RecoveryMode, RateLimited]].concat(),

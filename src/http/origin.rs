@@ -56,7 +56,9 @@ fn is_from_elsewhere(headers: &HeaderMap) -> bool {
 /// Whether an origin is the service's own: the name and port the request calls it by, or a configured name where a proxy
 /// in front calls it by another.
 fn is_own(config: &ServiceConfig, request: &Request, origin: &str) -> bool {
-    let Ok(origin) = origin.parse::<Uri>() else { return false };
+    let Ok(origin) = origin.parse::<Uri>() else {
+        return false;
+    };
     let (Some(scheme), Some(from)) = (origin.scheme(), origin.authority()) else {
         return false;
     };
@@ -69,7 +71,8 @@ fn is_own(config: &ServiceConfig, request: &Request, origin: &str) -> bool {
         (canonical(authority.host()), port)
     };
     let called = authority(request);
-    called.is_some_and(|called| place(&called) == place(from)) || is_configured(config, &canonical(from.host()))
+    called.is_some_and(|called| place(&called) == place(from))
+        || is_configured(config, &canonical(from.host()))
 }
 
 fn refused(origin: &str) -> Problem {

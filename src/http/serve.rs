@@ -67,7 +67,10 @@ pub async fn serve(
     tasks.close();
     let deadline = state.config.shutdown_timeout;
     if tokio::time::timeout(deadline, tasks.wait()).await.is_err() {
-        tracing::warn!(?deadline, "requests were still running at the deadline and are dropped");
+        tracing::warn!(
+            ?deadline,
+            "requests were still running at the deadline and are dropped"
+        );
         cut.cancel();
         // What does not end now ends with the runtime.
         let _ = tokio::time::timeout(CUT_WITHIN, tasks.wait()).await;

@@ -165,12 +165,10 @@ impl Describer<'_> {
             return Ok(Vec::new());
         };
         let load = |content| {
-            self.store
-                .original(content)
-                .map_err(|e| match e {
-                    StoreError::OutOfDescriptors { .. } => Failure::new(OUT_OF_DESCRIPTORS, e.to_string()),
-                    other => Failure::new("file_unreadable", other.to_string()),
-                })
+            self.store.original(content).map_err(|e| match e {
+                StoreError::OutOfDescriptors { .. } => Failure::new(OUT_OF_DESCRIPTORS, e.to_string()),
+                other => Failure::new("file_unreadable", other.to_string()),
+            })
         };
         let bytes = load(shape.content)?;
         let companions = shape

@@ -173,17 +173,30 @@ mod tests {
             Err(ClassNameError::TooLong { found: 101 })
         );
         assert_ne!(ClassName::new("Cat").unwrap(), ClassName::new("cat").unwrap());
-        for fine in ["...", ".git", "a.b", "sea lion", "猫", "כלב", "🦊", "a-b_c", "cat (2)"] {
+        for fine in [
+            "...", ".git", "a.b", "sea lion", "猫", "כלב", "🦊", "a-b_c", "cat (2)",
+        ] {
             assert_eq!(ClassName::new(fine).unwrap().as_str(), fine);
         }
     }
 
     #[test]
     fn a_hidden_character_is_refused_wherever_it_stands() {
-        for c in ['\r', '\n', '\0', '\u{85}', '\u{200b}', '\u{202e}', '\u{2066}', '\u{2028}', '\u{feff}', '\u{ad}'] {
+        for c in [
+            '\r', '\n', '\0', '\u{85}', '\u{200b}', '\u{202e}', '\u{2066}', '\u{2028}', '\u{feff}', '\u{ad}',
+        ] {
             let code = c.into();
-            for text in [format!("{c}abc"), format!("abc{c}"), format!("a{c}c"), format!(" {c} abc")] {
-                assert_eq!(ClassName::new(&text), Err(ClassNameError::Hidden { code }), "{text:?}");
+            for text in [
+                format!("{c}abc"),
+                format!("abc{c}"),
+                format!("a{c}c"),
+                format!(" {c} abc"),
+            ] {
+                assert_eq!(
+                    ClassName::new(&text),
+                    Err(ClassNameError::Hidden { code }),
+                    "{text:?}"
+                );
             }
         }
     }
@@ -197,7 +210,13 @@ mod tests {
             assert_eq!(ClassName::new(text), Err(ClassNameError::Slash), "{text:?}");
         }
         let id = ClassId::new().to_string();
-        let forms = [id.clone(), id.to_uppercase(), id.replace('-', ""), format!("{{{id}}}"), format!("urn:uuid:{id}")];
+        let forms = [
+            id.clone(),
+            id.to_uppercase(),
+            id.replace('-', ""),
+            format!("{{{id}}}"),
+            format!("urn:uuid:{id}"),
+        ];
         for text in forms {
             assert_eq!(ClassName::new(&text), Err(ClassNameError::Identifier), "{text:?}");
         }

@@ -94,7 +94,14 @@ mod tests {
         for c in "aß中שم한ก👩🦊 -_.'́\u{a0}\u{3000}".chars() {
             assert!(!is_hidden(c), "U+{:04X}", u32::from(c));
         }
-        for c in ['\u{200b}', '\u{202e}', '\u{2066}', '\u{3164}', '\u{fe0f}', '\u{e0041}'] {
+        for c in [
+            '\u{200b}',
+            '\u{202e}',
+            '\u{2066}',
+            '\u{3164}',
+            '\u{fe0f}',
+            '\u{e0041}',
+        ] {
             assert!(is_hidden(c), "U+{:04X}", u32::from(c));
         }
     }

@@ -127,14 +127,25 @@ pub(super) fn stage(backend: &dyn Backend, event: &Event) -> Result<Batch, Store
     let mut batch = Batch::default();
     let read_class = |id: ClassId| get::<Class>(backend, &keys::class(id));
     match event {
-        Event::ClassCreated { id, name, at, made_by } => {
+        Event::ClassCreated {
+            id,
+            name,
+            at,
+            made_by,
+        } => {
             if read_class(*id)?.is_none() {
                 put(&mut batch, keys::class(*id), &new_class(*id, name, *at))?;
                 put(&mut batch, keys::name(name), &NameLink::to_class(*id))?;
                 note_class(&mut batch, *made_by, *id)?;
             }
         }
-        Event::ClassFilled { id, name, shapes, at, made_by } => {
+        Event::ClassFilled {
+            id,
+            name,
+            shapes,
+            at,
+            made_by,
+        } => {
             if read_class(*id)?.is_none() {
                 let mut class = new_class(*id, name, *at);
                 for shape in shapes {
@@ -166,7 +177,12 @@ pub(super) fn stage(backend: &dyn Backend, event: &Event) -> Result<Batch, Store
                 }
             }
         }
-        Event::ShapesAdded { class, shapes, at, made_by } => {
+        Event::ShapesAdded {
+            class,
+            shapes,
+            at,
+            made_by,
+        } => {
             if let Some(mut class) = read_class(*class)? {
                 let before = class.shapes;
                 for shape in shapes {

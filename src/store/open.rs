@@ -5,7 +5,9 @@ use super::catalogue_log::{self, CatalogueLog, LogScan};
 use super::event::{self, Event, get, put, shapes_of};
 use super::failure::Failure;
 use super::payload::Number;
-use super::{Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, private, rebuild, snapshot};
+use super::{
+    Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, private, rebuild, snapshot,
+};
 use crate::model::Class;
 use std::fs::{File, TryLockError};
 use std::path::Path;
@@ -57,7 +59,12 @@ fn prepare(path: &Path) -> Result<File, StoreError> {
     }
     files::create_directory(path).map_err(fail)?;
     let mut lock = files::options();
-    let lock = lock.write(true).create(true).truncate(false).open(path.join("lock")).map_err(fail)?;
+    let lock = lock
+        .write(true)
+        .create(true)
+        .truncate(false)
+        .open(path.join("lock"))
+        .map_err(fail)?;
     match lock.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {

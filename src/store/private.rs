@@ -46,7 +46,9 @@ type Failed = Option<(String, std::io::Error)>;
 
 #[cfg(unix)]
 fn walk(directory: &Path, depth: usize, closed: &mut usize, failed: &mut Failed) {
-    let Ok(entries) = std::fs::read_dir(directory) else { return };
+    let Ok(entries) = std::fs::read_dir(directory) else {
+        return;
+    };
     for entry in entries.flatten() {
         // A link leads out of the directory; what it leads to is not ours to change.
         let Ok(kind) = entry.file_type() else { continue };
@@ -65,7 +67,9 @@ fn close(path: &Path, closed: &mut usize, failed: &mut Failed) {
     use std::os::unix::fs::PermissionsExt;
 
     // Gone in between: nothing to close.
-    let Ok(metadata) = std::fs::metadata(path) else { return };
+    let Ok(metadata) = std::fs::metadata(path) else {
+        return;
+    };
     let mode = metadata.permissions().mode();
     if mode & OTHERS == 0 {
         return;

@@ -17,4 +17,5 @@ mod promises;
 mod recovery_mode;
 mod security;
 mod snapshots;
+mod strangers;
 mod uploads;

@@ -5,6 +5,7 @@ mod catalogue;
 mod faults;
 mod formats;
 mod jobs;
+mod quotas;
 mod recovery;
 mod snapshots;
 mod traps;

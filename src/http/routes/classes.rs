@@ -175,7 +175,10 @@ pub(super) fn find_class(store: &Store, text: &str) -> Result<Class, Problem> {
 
 /// The class called exactly so, which may be a name that no new class gets, or so once the text is put in order.
 fn class_of_name(store: &Store, text: &str) -> Result<Option<Class>, StoreError> {
-    for name in [ClassName::stored(text), ClassName::new(text)].into_iter().flatten() {
+    for name in [ClassName::stored(text), ClassName::new(text)]
+        .into_iter()
+        .flatten()
+    {
         if let Some(class) = store.class_by_name(&name)? {
             return Ok(Some(class));
         }

@@ -113,12 +113,13 @@ pub async fn get_snapshot_file(
     let (found, path) = state
         .blocking(move |s| Ok((s.store.snapshot(id)?, s.store.snapshot_path(id))))
         .await?;
-    let file = tokio::fs::File::open(path)
-        .await
-        .map_err(|e| match StoreError::io("read a snapshot", &e) {
-            busy @ StoreError::OutOfDescriptors { .. } => Problem::from(busy),
-            _ => Problem::from(StoreError::NoSnapshot { id }).logged(e),
-        })?;
+    let file =
+        tokio::fs::File::open(path)
+            .await
+            .map_err(|e| match StoreError::io("read a snapshot", &e) {
+                busy @ StoreError::OutOfDescriptors { .. } => Problem::from(busy),
+                _ => Problem::from(StoreError::NoSnapshot { id }).logged(e),
+            })?;
     let mut response =
         Body::from_stream(tokio_util::io::ReaderStream::with_capacity(file, 256 << 10)).into_response();
     insert(&mut response, header::CONTENT_LENGTH, &found.bytes.to_string());
@@ -179,10 +180,16 @@ pub async fn restore_upload(
 fn require_snapshot_type(headers: &HeaderMap) -> Result<(), Problem> {
     let declared = media_type(headers);
     let accepted = ["application/zstd", "application/octet-stream"];
-    if declared.as_deref().is_some_and(|declared| accepted.contains(&declared)) {
+    if declared
+        .as_deref()
+        .is_some_and(|declared| accepted.contains(&declared))
+    {
         return Ok(());
     }
-    let found = declared.map_or_else(|| "no content type".to_owned(), |declared| format!("'{declared}'"));
+    let found = declared.map_or_else(
+        || "no content type".to_owned(),
+        |declared| format!("'{declared}'"),
+    );
     Err(Problem::new(
         Code::UnsupportedMediaType,
         format!("{found} is not read here; send application/zstd"),

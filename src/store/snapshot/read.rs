@@ -147,7 +147,12 @@ fn next<'a, R: Read>(
 fn save(entry: &mut impl Read, path: &Path, member: &Member) -> Result<(), StoreError> {
     let fail = |e: std::io::Error| StoreError::io(format!("write {}", path.display()), &e);
     let mut file = BufWriter::new(
-        files::options().write(true).create(true).truncate(true).open(path).map_err(fail)?,
+        files::options()
+            .write(true)
+            .create(true)
+            .truncate(true)
+            .open(path)
+            .map_err(fail)?,
     );
     let mut reader = Hashing::new(entry);
     let mut buffer = vec![0_u8; 128 << 10];
