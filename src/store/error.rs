@@ -176,5 +176,34 @@ impl StoreError {
 pub(crate) fn is_out_of_descriptors(error: &std::io::Error) -> bool {
     const ENFILE: i32 = 23;
     const EMFILE: i32 = 24;
-    cfg!(unix) && matches!(error.raw_os_error(), Some(ENFILE | EMFILE))
+    let told = match error.raw_os_error() {
+        Some(code) => [ENFILE, EMFILE].contains(&code),
+        // `tempfile` puts the path around the system's error, whose number is in the text only.
+        None => {
+            let text = error.to_string();
+            [ENFILE, EMFILE]
+                .iter()
+                .any(|code| text.contains(&format!("(os error {code})")))
+        }
+    };
+    cfg!(unix) && told
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_want_of_descriptors_is_told_apart_also_inside_another_error() {
+        for code in [23, 24] {
+            let bare = std::io::Error::from_raw_os_error(code);
+            let wrapped = std::io::Error::other(format!("{bare} at path \"/x\""));
+            for error in [bare, wrapped] {
+                let told = StoreError::io("write", &error);
+                assert!(matches!(told, StoreError::OutOfDescriptors { .. }), "{error}");
+            }
+        }
+        let other = StoreError::io("write", &std::io::Error::from_raw_os_error(2));
+        assert!(matches!(other, StoreError::Io { .. }));
+    }
 }
