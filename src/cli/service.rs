@@ -1,7 +1,7 @@
 //! Starting and ending the service, for `serve` and for `demo`.
 
 use super::{CliError, process};
-use crate::http::{AppState, OpenError, ServiceConfig, serve};
+use crate::http::{AppState, OpenError, ServiceConfig, announce, serve};
 use std::future::Future;
 use std::net::SocketAddr;
 use tokio::net::TcpListener;
@@ -30,7 +30,9 @@ pub fn run_until(
                 OpenError::Unguarded { .. } => CliError::Usage(error.to_string()),
                 other => CliError::Failed(other.to_string()),
             })?;
-        listening(listener.local_addr()?)?;
+        let address = listener.local_addr()?;
+        announce(&state, address);
+        listening(address)?;
         serve(state, listener, shutdown)
             .await
             .map_err(|error| CliError::Failed(error.to_string()))

@@ -39,5 +39,5 @@ pub mod uploaded;
 
 pub use config::ServiceConfig;
 pub use router::router;
-pub use serve::serve;
+pub use serve::{announce, serve};
 pub use state::{AppState, OpenError};

@@ -28,9 +28,6 @@ pub enum ServeError {
     /// The certificate or its key cannot be used.
     #[error(transparent)]
     Tls(#[from] TlsError),
-    /// The listener has no address.
-    #[error("the listener failed: {0}")]
-    Listener(#[from] std::io::Error),
 }
 
 /// How long to wait after a connection could not be accepted.
@@ -55,7 +52,6 @@ pub async fn serve(
     tokio::spawn(housekeeping::run(state.clone()));
     let cut = CancellationToken::new();
     let line = Arc::new(Line::new(state.clone(), cut.clone())?);
-    publish(&state, listener.local_addr()?);
     let tasks = TaskTracker::new();
     tokio::select! {
         never = accept(&line, &listener, &tasks) => match never {},
@@ -79,8 +75,9 @@ pub async fn serve(
     Ok(())
 }
 
-/// Lets the owner of the data directory find the service and be known to it.
-fn publish(state: &AppState, listening: SocketAddr) {
+/// Lets the owner of the data directory find the service and be known to it, until [`serve`] ends. For before anybody is
+/// told that the service listens.
+pub fn announce(state: &AppState, listening: SocketAddr) {
     let url = local_url(listening, state.config.tls_cert.is_some());
     if let Err(error) = state.local_token.publish(&state.config.data_dir, url) {
         tracing::warn!(%error, "the local token was not written; while there is no key, keys are made with the service stopped");

@@ -116,12 +116,6 @@ fn the_token_is_new_at_each_start_and_in_no_log() {
         )
         .unwrap();
         let file = dir.path().join("d/local-access.json");
-        for _ in 0..100 {
-            if file.exists() {
-                break;
-            }
-            std::thread::sleep(std::time::Duration::from_millis(50));
-        }
         answer(dir.path(), &["keys", "list", "--data", "d"]);
         let access = last_json(&std::fs::read_to_string(&file).unwrap());
         tokens.push(access["token"].as_str().unwrap().to_owned());

@@ -8,7 +8,7 @@ use serde_json::json;
 
 /// What a page can send anywhere without asking there first, and what it would do.
 fn simple_requests() -> Vec<(&'static str, &'static str, &'static str, Body)> {
-    let (form, files) = multipart(&[("evil.off", &off("bean", 1))]);
+    let (form, files) = multipart(&[("evil.off", off("bean", 1).as_ref())]);
     let form: &'static str = form.leak();
     vec![
         (
