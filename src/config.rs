@@ -11,7 +11,7 @@ use crate::parameters::Preset;
 use crate::store::StoreOptions;
 use crate::telemetry::LogFormat;
 use serde::{Deserialize, Serialize};
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -102,6 +102,8 @@ settings! {
     recovery_mode: bool = false, "SHAPELEX_RECOVERY_MODE", "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true";
     /// Address and port to listen on; port 0 takes a free one and says which
     listen: SocketAddr = DEFAULT_LISTEN, "SHAPELEX_LISTEN", "ADDRESS";
+    /// Name or address clients call the service by, beside those of loopback and the listen address, such as shapes.example; * for any
+    host: Vec<String> = Vec::new(), "SHAPELEX_HOST", "NAME", value_delimiter = ',', action = clap::ArgAction::Append;
     /// Answer requests without an API key beyond loopback too, as long as no key exists
     allow_anonymous: bool = false, "SHAPELEX_ALLOW_ANONYMOUS", "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true";
     /// Certificate chain (PEM) for HTTPS by the service itself, with --tls-key; none for HTTP
@@ -110,11 +112,13 @@ settings! {
     tls_key: PathBuf = PathBuf::new(), "SHAPELEX_TLS_KEY", "FILE";
     /// Origins whose pages may call the API from a browser, such as https://viewer.example, or * for all
     cors_origin: Vec<String> = Vec::new(), "SHAPELEX_CORS_ORIGIN", "ORIGIN", value_delimiter = ',', action = clap::ArgAction::Append;
-    /// Connections served at a time; more wait
+    /// Connections served at a time, as far as the system lets files be open; for one more the longest idle one goes
     max_connections: usize = 1024, "SHAPELEX_MAX_CONNECTIONS", "COUNT";
+    /// Connections of one address served at a time; 0 for a quarter of all
+    max_connections_per_address: usize = 0, "SHAPELEX_MAX_CONNECTIONS_PER_ADDRESS", "COUNT";
     /// Time the head of a request may take to arrive, and a connection may idle, in seconds
     header_timeout_seconds: u64 = 20, "SHAPELEX_HEADER_TIMEOUT_SECONDS", "SECONDS";
-    /// Longest head of a request, in KiB
+    /// Longest head of a request, its line and at most 100 headers, in KiB
     max_header_kib: usize = 32, "SHAPELEX_MAX_HEADER_KIB", "KIB";
     /// Meshes an API key may query per minute, where it does not say itself; 0 for no limit
     key_queries_per_minute: u32 = 0, "SHAPELEX_KEY_QUERIES_PER_MINUTE", "COUNT";
@@ -215,6 +219,17 @@ fn is_origin(text: &str) -> bool {
     text == "*" || host.is_some_and(|host| !host.is_empty() && host.chars().all(inside))
 }
 
+/// `*`, a name as DNS has it, or an IP address.
+fn is_host(text: &str) -> bool {
+    let bare = text.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
+    let part = |part: &str| {
+        let inside = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        (1..=63).contains(&part.len()) && part.chars().all(inside)
+    };
+    let name = text.strip_suffix('.').unwrap_or(text);
+    text == "*" || bare.unwrap_or(text).parse::<IpAddr>().is_ok() || name.split('.').all(part)
+}
+
 /// The parser's message with the line it is about, on one line.
 fn one_line(error: &toml::de::Error, text: &str) -> String {
     let message = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
@@ -263,10 +278,17 @@ impl Config {
                 found: self.otlp_endpoint.clone(),
             });
         }
-        if !(8..=1024).contains(&self.max_header_kib) {
+        if let Some(name) = self.host.iter().find(|name| !is_host(name)) {
+            return Err(ConfigError::OutOfRange {
+                name: "host",
+                expected: "* or a name or address without scheme and port, such as shapes.example",
+                found: name.clone(),
+            });
+        }
+        if !(1..=1024).contains(&self.max_header_kib) {
             return Err(ConfigError::OutOfRange {
                 name: "max_header_kib",
-                expected: "between 8 and 1024",
+                expected: "between 1 and 1024",
                 found: self.max_header_kib.to_string(),
             });
         }
@@ -286,11 +308,13 @@ impl Config {
         let or_default = |threads: usize, default: usize| if threads == 0 { default } else { threads };
         ServiceConfig {
             listen: self.listen,
+            hosts: self.host.clone(),
             allow_anonymous: self.allow_anonymous,
             check_keys: true,
             tls_cert: given(&self.tls_cert),
             tls_key: given(&self.tls_key),
             max_connections: self.max_connections,
+            max_connections_per_address: Some(self.max_connections_per_address).filter(|&n| n > 0),
             header_timeout: Duration::from_secs(self.header_timeout_seconds),
             max_header_bytes: self.max_header_kib << 10,
             cors_origins: self.cors_origin.clone(),

@@ -4,12 +4,16 @@
 //! uploading, indexing and querying.
 
 use super::CliError;
-use crate::config::{Config, DEFAULT_LISTEN};
-use crate::http::{AppState, router};
+use crate::config::{Config, DEFAULT_DATA, DEFAULT_LISTEN};
+use crate::http::host::canonical;
+use crate::http::local_access::LocalAccess;
+use crate::http::{AppState, OpenError, router};
+use crate::store::StoreError;
 use axum::Router;
 use axum::body::Body;
-use axum::http::Request;
+use axum::http::{Request, Uri};
 use serde_json::Value;
+use std::net::IpAddr;
 use std::path::Path;
 use std::time::Duration;
 use tower::ServiceExt;
@@ -22,8 +26,8 @@ const CLOSE_WITHIN: Duration = Duration::from_secs(30);
 /// Where a command works.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct TargetArgs {
-    /// Data directory to work in, when no service runs on it [default: shapelex-data]
-    #[arg(long, env = "SHAPELEX_DATA", value_name = "DIR", conflicts_with = "server")]
+    /// Data directory to work in; `keys` and `snapshot` ask the service that runs on it [default: shapelex-data]
+    #[arg(long, env = "SHAPELEX_DATA", value_name = "DIR")]
     pub data: Option<std::path::PathBuf>,
     /// Running service to work with, such as http://127.0.0.1:7345
     #[arg(long, env = "SHAPELEX_SERVER", value_name = "URL")]
@@ -44,6 +48,51 @@ impl TargetArgs {
             None => Client::local(self.data.as_deref()),
         }
     }
+
+    /// As [`client`](Self::client), for what only an operator may do. On a data directory that a service runs on it is
+    /// that service's client. Without an API key it brings the token that the service keeps in its data directory.
+    ///
+    /// # Errors
+    /// As [`Client::remote`] and [`Client::local`].
+    pub fn operator_client(&self) -> Result<Client, CliError> {
+        let data = self.data.as_deref().unwrap_or(Path::new(DEFAULT_DATA));
+        let access = || LocalAccess::read(data);
+        if let Some(url) = &self.server {
+            let token = || Some(access().filter(|access| same_place(&access.url, url))?.token);
+            return Ok(Client::remote(url)?.with_key(self.api_key.clone().or_else(token)));
+        }
+        let locked = match Client::open(Some(data)) {
+            Err(error @ OpenError::Store(StoreError::Locked { .. })) => error,
+            opened => return opened.map_err(|error| CliError::Failed(error.to_string())),
+        };
+        // One that speaks TLS only is not for this client.
+        match access().filter(|access| access.url.starts_with("http://")) {
+            None => Err(CliError::Failed(locked.to_string())),
+            Some(access) => {
+                eprintln!(
+                    "shapelex: a service runs on {}; asking it at {}",
+                    data.display(),
+                    access.url
+                );
+                Ok(Client::remote(&access.url)?.with_key(self.api_key.clone().or(Some(access.token))))
+            }
+        }
+    }
+}
+
+/// Whether two addresses are of the same service on this machine: the token must reach no other.
+fn same_place(one: &str, other: &str) -> bool {
+    let place = |url: &str| {
+        let uri: Uri = url.trim_end_matches('/').parse().ok()?;
+        let host = canonical(uri.host()?);
+        let loopback = host == "localhost"
+            || host
+                .parse::<IpAddr>()
+                .is_ok_and(|ip| ip.to_canonical().is_loopback());
+        let host = if loopback { "localhost".to_owned() } else { host };
+        Some((uri.scheme_str()?.to_owned(), host, uri.port_u16()))
+    };
+    place(one).is_some_and(|one| place(other) == Some(one))
 }
 
 /// A body to send.
@@ -135,6 +184,10 @@ impl Client {
     /// # Errors
     /// [`CliError::Failed`] where the directory cannot be opened.
     pub fn local(data: Option<&Path>) -> Result<Self, CliError> {
+        Self::open(data).map_err(|error| CliError::Failed(error.to_string()))
+    }
+
+    fn open(data: Option<&Path>) -> Result<Self, OpenError> {
         let mut config = Config::default();
         if let Some(data) = data {
             config.data = data.to_owned();
@@ -149,10 +202,11 @@ impl Client {
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
             .enable_all()
-            .build()?;
+            .build()
+            .map_err(OpenError::Runtime)?;
         let state = {
             let _inside = runtime.enter();
-            AppState::open(service).map_err(|error| CliError::Failed(error.to_string()))?
+            AppState::open(service)?
         };
         let router = router(state.clone());
         Ok(Self(Transport::Local {
@@ -259,5 +313,32 @@ impl Drop for Client {
                 tracing::warn!(%error, "the last flush failed");
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::same_place;
+
+    #[test]
+    fn the_token_goes_to_the_service_that_wrote_it_only() {
+        let written = "http://127.0.0.1:7345";
+        for same in [
+            "http://127.0.0.1:7345",
+            "http://localhost:7345/",
+            "http://[::1]:7345",
+        ] {
+            assert!(same_place(written, same), "{same}");
+        }
+        for other in [
+            "http://127.0.0.1:7346",
+            "http://10.0.0.1:7345",
+            "http://localhost",
+            "https://127.0.0.1:7345",
+            "x",
+        ] {
+            assert!(!same_place(written, other), "{other}");
+        }
+        assert!(same_place("http://10.0.0.1:80", "http://10.0.0.1:80"));
     }
 }

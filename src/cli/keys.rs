@@ -69,7 +69,7 @@ pub struct RevokeArgs {
 pub fn run(args: &KeysArgs, json: bool) -> Result<(), CliError> {
     match &args.command {
         KeysCommand::Create(args) => create(args, json),
-        KeysCommand::List(target) => list(&target.client()?, json),
+        KeysCommand::List(target) => list(&target.operator_client()?, json),
         KeysCommand::Revoke(args) => revoke(args, json),
     }
 }
@@ -101,7 +101,7 @@ fn create(args: &CreateArgs, json: bool) -> Result<(), CliError> {
     }
     let made = args
         .target
-        .client()?
+        .operator_client()?
         .call("POST", "/v1/keys", Payload::Json(Value::Object(body)))?;
     if json {
         return output::json(&made);
@@ -151,7 +151,9 @@ fn row(key: &Value) -> Vec<String> {
 
 fn revoke(args: &RevokeArgs, json: bool) -> Result<(), CliError> {
     let path = format!("/v1/keys/{}", encode(&args.key));
-    args.target.client()?.call("DELETE", &path, Payload::Empty)?;
+    args.target
+        .operator_client()?
+        .call("DELETE", &path, Payload::Empty)?;
     if json {
         output::json(&json!({ "revoked": args.key }))
     } else {

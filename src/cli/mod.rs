@@ -29,6 +29,7 @@ mod openapi;
 mod output;
 mod parameters;
 mod peak_memory;
+mod process;
 mod progress;
 pub mod query;
 mod refused;

@@ -1,7 +1,7 @@
 //! Starting and ending the service, for `serve` and for `demo`.
 
-use super::CliError;
-use crate::http::{AppState, OpenError, ServiceConfig, serve};
+use super::{CliError, process};
+use crate::http::{AppState, OpenError, ServiceConfig, announce, serve};
 use std::future::Future;
 use std::net::SocketAddr;
 use tokio::net::TcpListener;
@@ -11,10 +11,11 @@ use tokio::net::TcpListener;
 /// # Errors
 /// [`CliError::Failed`] where the data directory cannot be opened, the address cannot be bound or serving fails.
 pub fn run_until(
-    config: ServiceConfig,
+    mut config: ServiceConfig,
     shutdown: impl Future<Output = ()> + Send + 'static,
     listening: impl FnOnce(SocketAddr) -> Result<(), CliError>,
 ) -> Result<(), CliError> {
+    process::prepare(&mut config);
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
     let outcome = runtime.block_on(async {
         let address = config.listen;
@@ -29,7 +30,9 @@ pub fn run_until(
                 OpenError::Unguarded { .. } => CliError::Usage(error.to_string()),
                 other => CliError::Failed(other.to_string()),
             })?;
-        listening(listener.local_addr()?)?;
+        let address = listener.local_addr()?;
+        announce(&state, address);
+        listening(address)?;
         serve(state, listener, shutdown)
             .await
             .map_err(|error| CliError::Failed(error.to_string()))

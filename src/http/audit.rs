@@ -130,7 +130,10 @@ impl Audit {
 
 impl Open {
     fn at(path: &Path) -> std::io::Result<Self> {
-        let file = OpenOptions::new().create(true).append(true).open(path)?;
+        let mut options = OpenOptions::new();
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        let file = options.create(true).append(true).open(path)?;
         let length = file.metadata()?.len();
         Ok(Self { file, length })
     }

@@ -38,6 +38,22 @@ pub fn access_of(operation: &str) -> Access {
     }
 }
 
+/// Whether an operation only asks how the service is; probes are answered by any name and are not logged.
+pub fn is_probe(operation: &str) -> bool {
+    matches!(operation, "get_liveness" | "get_readiness")
+}
+
+/// Whether an operation needs the local token as long as there is no key: what hands the service over to somebody else,
+/// that is keys and restoring. What needs a key of scope `admin` and is not listed does, so that a new operation is
+/// closed until it is decided about.
+pub fn needs_local_token(operation: &str) -> bool {
+    let open = matches!(
+        operation,
+        "create_snapshot" | "list_snapshots" | "get_snapshot" | "get_snapshot_file" | "delete_snapshot"
+    );
+    access_of(operation) == Access::Needs(Scope::Admin) && !open
+}
+
 /// Who asks: a key, or nobody in particular where keys are off. Among the extensions of every request.
 #[derive(Clone, Debug, Default)]
 pub struct Caller {
@@ -71,13 +87,22 @@ pub fn needs_a_key_to_start(config: &ServiceConfig) -> bool {
     config.check_keys && !config.listen.ip().is_loopback() && !config.allow_anonymous
 }
 
-/// Finds out who asks, and whether they may: `unauthorized` or `insufficient_scope` where they may not.
-pub fn authorize(parts: &Parts, headers: &HeaderMap, access: Access) -> (Caller, Result<(), Problem>) {
+/// Finds out who asks, and whether they may ask for the operation: `unauthorized` or `insufficient_scope` where they may not.
+pub fn authorize(
+    parts: &Parts,
+    headers: &HeaderMap,
+    operation: &str,
+    access: Access,
+) -> (Caller, Result<(), Problem>) {
     let Access::Needs(scope) = access else {
         return (Caller::default(), Ok(()));
     };
     if !keys_are_on(parts) {
-        return (Caller::default(), Ok(()));
+        let allowed = !parts.config.check_keys
+            || !needs_local_token(operation)
+            || presented(headers).is_some_and(|token| parts.local_token.is(token));
+        let refused = || Err(Problem::new(Code::Unauthorized, NEEDS_TOKEN));
+        return (Caller::default(), if allowed { Ok(()) } else { refused() });
     }
     let key = match identify(parts, headers) {
         Ok(key) => key,
@@ -99,10 +124,16 @@ pub fn authorize(parts: &Parts, headers: &HeaderMap, access: Access) -> (Caller,
     (caller, Err(problem))
 }
 
+const NEEDS_TOKEN: &str = "there is no API key yet, so this needs the token in the file local-access.json of the data \
+directory; `shapelex keys` and `shapelex snapshot` send it by themselves where --data names that directory";
+
 fn identify(parts: &Parts, headers: &HeaderMap) -> Result<Arc<ApiKey>, &'static str> {
     let secret = presented(headers).ok_or(
         "send an API key, as 'Authorization: Bearer slx_…' or 'X-API-Key: slx_…'; `shapelex keys create` makes one",
     )?;
+    if parts.local_token.is(secret) {
+        return Err("there is an API key, so the local token opens nothing; send a key of scope 'admin'");
+    }
     let key = parts
         .keys
         .find(secret)

@@ -1,6 +1,7 @@
 //! The service's settings: plain values, filled by whoever starts it.
 
 use super::archive::ArchiveLimits;
+use super::connections::ConnectionLimits;
 use super::upload::UploadLimits;
 use crate::jobs::JobOptions;
 use crate::mesh::Limits;
@@ -16,9 +17,11 @@ use std::time::Duration;
 pub struct ServiceConfig {
     /// Where it listens.
     pub listen: SocketAddr,
+    /// Names and addresses clients call it by, beside those of loopback and of `listen`; `*` for all.
+    pub hosts: Vec<String>,
     /// Whether requests without a key are answered also where `listen` is not loopback, as long as no key exists.
     pub allow_anonymous: bool,
-    /// Whether keys are looked at. Not so for callers inside this process, who have the data directory anyway.
+    /// Whether keys, names and origins are looked at. Not so for callers inside this process, who have the data directory anyway.
     pub check_keys: bool,
     /// The certificate chain of HTTPS, PEM.
     pub tls_cert: Option<PathBuf>,
@@ -26,6 +29,8 @@ pub struct ServiceConfig {
     pub tls_key: Option<PathBuf>,
     /// Connections served at a time.
     pub max_connections: usize,
+    /// Connections of one address served at a time; `None` for a quarter of all.
+    pub max_connections_per_address: Option<usize>,
     /// How long the head of a request may take to arrive, and a connection may idle.
     pub header_timeout: Duration,
     /// Longest head of a request, in bytes.
@@ -90,11 +95,13 @@ impl Default for ServiceConfig {
         let jobs = JobOptions::default();
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 7878)),
+            hosts: Vec::new(),
             allow_anonymous: false,
             check_keys: true,
             tls_cert: None,
             tls_key: None,
             max_connections: 1024,
+            max_connections_per_address: None,
             header_timeout: Duration::from_secs(20),
             max_header_bytes: 32 << 10,
             cors_origins: Vec::new(),
@@ -127,6 +134,15 @@ impl Default for ServiceConfig {
 }
 
 impl ServiceConfig {
+    /// How many connections there may be.
+    pub fn connection_limits(&self) -> ConnectionLimits {
+        let quarter = self.max_connections.div_ceil(4);
+        ConnectionLimits {
+            total: self.max_connections,
+            per_address: self.max_connections_per_address.unwrap_or(quarter),
+        }
+    }
+
     /// What an upload may hold.
     pub fn upload_limits(&self) -> UploadLimits {
         UploadLimits {

@@ -3,8 +3,8 @@
 use super::problem::{Code, Problem};
 use super::upload::body_too_large;
 use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
-use axum::http::header;
 use axum::http::request::Parts;
+use axum::http::{HeaderMap, header};
 use serde::de::DeserializeOwned;
 use std::time::Duration;
 
@@ -69,10 +69,7 @@ impl<S: Send + Sync, T: DeserializeOwned + Default> FromRequest<S> for OptionalJ
 }
 
 async fn body(request: Request) -> Result<bytes::Bytes, Problem> {
-    let media_type = request
-        .headers()
-        .get(header::CONTENT_TYPE)
-        .map(|v| String::from_utf8_lossy(v.as_bytes()).to_ascii_lowercase());
+    let declared = media_type(request.headers());
     let receiving = axum::body::to_bytes(request.into_body(), MAX_JSON_BYTES);
     let bytes = tokio::time::timeout(JSON_WITHIN, receiving)
         .await
@@ -85,17 +82,37 @@ async fn body(request: Request) -> Result<bytes::Bytes, Problem> {
             .with("limit_seconds", seconds)
         })?
         .map_err(|_| body_too_large(MAX_JSON_BYTES))?;
-    let essence = media_type
-        .as_deref()
-        .map(|t| t.split(';').next().unwrap_or_default().trim());
-    match essence {
-        None | Some("application/json") => Ok(bytes),
-        Some(_) if bytes.is_empty() => Ok(bytes),
-        Some(other) => Err(Problem::new(
-            Code::UnsupportedMediaType,
-            format!("'{other}' is not read here; send application/json"),
-        )),
+    match declared {
+        _ if bytes.is_empty() => Ok(bytes),
+        Some(declared) if is_json(&declared) => Ok(bytes),
+        Some(other) => Err(unsupported(&format!("'{other}'"))),
+        None => Err(unsupported("a body without a content type")),
     }
+}
+
+fn unsupported(found: &str) -> Problem {
+    Problem::new(
+        Code::UnsupportedMediaType,
+        format!("{found} is not read here; send JSON with 'content-type: application/json'"),
+    )
+}
+
+/// The declared media type in lower case, without its parameters. Several declarations are none: which one counts
+/// would depend on who reads them.
+pub(super) fn media_type(headers: &HeaderMap) -> Option<String> {
+    let mut declared = headers.get_all(header::CONTENT_TYPE).iter();
+    let (first, None) = (declared.next()?, declared.next()) else {
+        return None;
+    };
+    let text = String::from_utf8_lossy(first.as_bytes()).to_ascii_lowercase();
+    Some(text.split(';').next().unwrap_or_default().trim().to_owned())
+}
+
+/// `application/json`, or a type built on it, such as `application/merge-patch+json`. No form of a web page sends these.
+fn is_json(media_type: &str) -> bool {
+    media_type
+        .strip_prefix("application/")
+        .is_some_and(|kind| kind == "json" || kind.ends_with("+json"))
 }
 
 fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {

@@ -74,23 +74,20 @@ impl Keyring {
     }
 }
 
-/// A new secret: `slx_` and 256 random bits of the operating system, 47 characters.
+/// A new secret: a prefix and 256 random bits of the operating system, 43 characters.
 ///
 /// # Errors
 /// Where the system has no randomness.
-pub fn new_secret() -> Result<String, OsError> {
+pub fn new_secret(prefix: &str) -> Result<String, OsError> {
     let mut bytes = [0; SECRET_BYTES];
     OsRng.try_fill_bytes(&mut bytes)?;
-    Ok(format!(
-        "{}{}",
-        crate::model::key::SECRET_PREFIX,
-        URL_SAFE_NO_PAD.encode(bytes)
-    ))
+    Ok(format!("{prefix}{}", URL_SAFE_NO_PAD.encode(bytes)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::key::SECRET_PREFIX;
     use crate::model::{KeyId, KeyLimits, KeyName, Scope};
 
     fn key(name: &str, secret: &str) -> ApiKey {
@@ -107,7 +104,10 @@ mod tests {
 
     #[test]
     fn secrets_are_long_and_differ() {
-        let (a, b) = (new_secret().unwrap(), new_secret().unwrap());
+        let (a, b) = (
+            new_secret(SECRET_PREFIX).unwrap(),
+            new_secret(SECRET_PREFIX).unwrap(),
+        );
         assert_eq!((a.len(), &a[..4]), (47, "slx_"));
         assert_ne!(a, b);
     }

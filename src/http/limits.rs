@@ -5,9 +5,8 @@
 
 use super::auth::Caller;
 use super::problem::{Code, Problem};
-use super::state::Parts;
-use crate::model::{ClassId, KeyId, KeyLimits, Shape};
-use crate::store::AddedShape;
+use crate::model::{KeyId, KeyLimits};
+use crate::store::Maker;
 use axum::http::{HeaderName, HeaderValue};
 use axum::response::Response;
 use governor::clock::{Clock, DefaultClock};
@@ -108,59 +107,18 @@ impl Limits {
         Arc::clone(limiter)
     }
 
-    /// Whether a key may make `classes` more classes and add `bytes` more bytes of shapes. Blocks on the disk.
-    ///
-    /// # Errors
-    /// `quota_exceeded`; what keeps the records from being read.
-    pub fn check_quota(
-        &self,
-        parts: &Parts,
-        caller: &Caller,
-        classes: u64,
-        bytes: u64,
-    ) -> Result<(), Problem> {
-        let Some(key) = &caller.key else { return Ok(()) };
-        let most_classes = key.limits.classes.or(self.defaults.classes);
-        let most_bytes = key.limits.stored_bytes.or(self.defaults.stored_bytes);
-        if most_classes.is_none() && most_bytes.is_none() {
-            return Ok(());
-        }
-        let used = parts.store.usage(key.id)?;
-        let checks = [
-            ("classes", "classes", used.classes, classes, most_classes),
-            ("stored_bytes", "bytes of shapes", used.bytes, bytes, most_bytes),
-        ];
-        for (name, what, used, more, most) in checks {
-            if let Some(most) = most
-                && more > 0
-                && used.saturating_add(more) > most
-            {
-                return Err(Problem::new(
-                    Code::QuotaExceeded,
-                    format!(
-                        "key '{}' may have {most} {what}; it has {used}, and this would add {more}",
-                        key.name
-                    ),
-                )
-                .with("quota", name)
-                .with("limit", most)
-                .with("used", used));
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Counts what a key made against its quota. It is there already, so a count that cannot be written stops nothing.
-pub fn note(parts: &Parts, caller: &Caller, class: Option<ClassId>, added: &[AddedShape]) {
-    let Some(key) = &caller.key else { return };
-    let new: Vec<Shape> = added
-        .iter()
-        .filter(|a| a.created)
-        .map(|a| a.shape.clone())
-        .collect();
-    if let Err(error) = parts.store.note_usage(key.id, class, &new) {
-        tracing::error!(%error, key = key.name.as_str(), "what the key made was not counted against its quota");
+    /// On whose account a caller makes classes and shapes; `None` for callers without a key, who have no quota. The
+    /// store holds the quota, in the same transaction as the change.
+    pub fn maker(&self, caller: &Caller) -> Option<Maker> {
+        let key = caller.key.as_ref()?;
+        Some(Maker {
+            key: key.id,
+            limits: KeyLimits {
+                queries_per_minute: None,
+                stored_bytes: key.limits.stored_bytes.or(self.defaults.stored_bytes),
+                classes: key.limits.classes.or(self.defaults.classes),
+            },
+        })
     }
 }
 

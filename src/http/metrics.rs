@@ -155,9 +155,7 @@ pub fn render(state: &AppState) -> String {
     let live = state.jobs.live_index();
     gauge!("shapelex_compute_running").set(state.compute.running() as f64);
     gauge!("shapelex_compute_waiting").set(state.compute.waiting() as f64);
-    let places = state.config.max_connections.max(1);
-    let free = state.connections.available_permits();
-    gauge!("shapelex_connections").set(places.saturating_sub(free) as f64);
+    gauge!("shapelex_connections").set(state.connections.len() as f64);
     gauge!("shapelex_api_keys").set(state.keys.len() as f64);
     gauge!("shapelex_jobs_pending").set(state.jobs.queue_depth() as f64);
     gauge!("shapelex_index_generation").set(live.generation.as_ref().map_or(0, |g| g.number) as f64);

@@ -1,10 +1,11 @@
 //! The API's description, made out of the handlers. `openapi.yaml` at the top level is this document; a test fails
 //! where the two differ, and another one where the route table does.
 
-use super::auth::{Access, access_of};
+use super::auth::{Access, access_of, is_probe};
 use super::dto::problem::ProblemDocument;
 use super::problem::Code;
 use super::routes::{classes, docs, health, index, jobs, keys, query, shapes, snapshots};
+use crate::model::ClassName;
 use axum::http::Method;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -12,7 +13,7 @@ use utoipa::openapi::path::{Operation, PathItem};
 use utoipa::openapi::security::{
     ApiKey, ApiKeyValue, HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme,
 };
-use utoipa::openapi::{Content, Ref, RefOr, Response, ResponseBuilder};
+use utoipa::openapi::{Content, Ref, RefOr, Response, ResponseBuilder, Schema};
 use utoipa::{Modify, OpenApi};
 
 #[derive(OpenApi)]
@@ -48,7 +49,7 @@ use utoipa::{Modify, OpenApi};
         docs::get_page, docs::get_docs, docs::get_openapi_yaml, docs::get_openapi_json,
     ),
     components(schemas(ProblemDocument)),
-    modifiers(&Problems, &Keys)
+    modifiers(&Problems, &Keys, &Names)
 )]
 struct Document;
 
@@ -119,10 +120,11 @@ struct Problems;
 impl Modify for Problems {
     fn modify(&self, document: &mut utoipa::openapi::OpenApi) {
         for item in document.paths.paths.values_mut() {
-            for (_, operation) in operations_of(item) {
+            for (method, operation) in operations_of(item) {
                 let id = operation.operation_id.clone().unwrap_or_default();
                 let mut by_status: BTreeMap<u16, Vec<Code>> = BTreeMap::new();
-                for code in problems_of(&id) {
+                let strangers = (method != "GET").then_some(Code::CrossSiteRequest);
+                for code in problems_of(&id).into_iter().chain(strangers) {
                     by_status.entry(code.status().as_u16()).or_default().push(code);
                 }
                 for (status, codes) in by_status {
@@ -167,6 +169,22 @@ impl Modify for Keys {
                     description.push_str("\n\n");
                 }
                 description.push_str(&format!("Where keys are on, a key of scope `{scope}`."));
+            }
+        }
+    }
+}
+
+/// Says what a class may be called, in the words of the code that checks it.
+struct Names;
+
+impl Modify for Names {
+    fn modify(&self, document: &mut utoipa::openapi::OpenApi) {
+        let schemas = &mut document.components.get_or_insert_default().schemas;
+        for request in ["CreateClass", "RenameClass"] {
+            if let Some(RefOr::T(Schema::Object(body))) = schemas.get_mut(request)
+                && let Some(RefOr::T(Schema::Object(name))) = body.properties.get_mut("name")
+            {
+                name.pattern = Some(ClassName::pattern());
             }
         }
     }
@@ -273,7 +291,13 @@ fn problems_of(operation: &str) -> Vec<Code> {
         "restore_upload" => [
             WRITE,
             RESTORE,
-            &[EmptyBody, InvalidRequest, RequestTimeout, BodyTooLarge],
+            &[
+                EmptyBody,
+                InvalidRequest,
+                RequestTimeout,
+                BodyTooLarge,
+                UnsupportedMediaType,
+            ],
         ]
         .concat(),
         "query_batch" => [UPLOAD, &[IndexEmpty, RecoveryMode, RateLimited]].concat(),
@@ -282,7 +306,12 @@ fn problems_of(operation: &str) -> Vec<Code> {
     if access_of(operation) != Access::Public {
         codes.extend([Unauthorized, InsufficientScope]);
     }
-    codes.extend([UriTooLong, Internal]);
+    if !is_probe(operation) {
+        codes.push(MisdirectedRequest);
+    }
+    codes.extend([UriTooLong, Overloaded, Internal]);
+    codes.sort_unstable();
+    codes.dedup();
     codes
 }
 

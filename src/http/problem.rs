@@ -45,6 +45,8 @@ codes! {
     InvalidField, "invalid_field", 422, "A field is unknown, missing or has a wrong value";
     InvalidName, "invalid_name", 422, "The name is not acceptable";
     InvalidParameter, "invalid_parameter", 422, "A parameter is outside its range";
+    MisdirectedRequest, "misdirected_request", 421, "The service does not go by the name in the request";
+    CrossSiteRequest, "cross_site_request", 403, "A page of another site may not ask for this";
     Unauthorized, "unauthorized", 401, "A valid API key is needed";
     InsufficientScope, "insufficient_scope", 403, "The API key does not allow this";
     RateLimited, "rate_limited", 429, "The API key's queries per minute are used up";

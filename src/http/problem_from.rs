@@ -195,6 +195,18 @@ impl From<StoreError> for Problem {
                 Self::new(Code::SnapshotRunning, detail).with("retry_after_seconds", 10)
             }
             StoreError::BadSnapshot { .. } => Self::new(Code::InvalidSnapshot, detail),
+            StoreError::QuotaExceeded {
+                quota, limit, used, ..
+            } => Self::new(Code::QuotaExceeded, detail)
+                .with("quota", quota.name())
+                .with("limit", limit)
+                .with("used", used),
+            StoreError::OutOfDescriptors { .. } => Self::new(
+                Code::Overloaded,
+                "the service has as many files and connections open as it may; nothing was changed",
+            )
+            .with("retry_after_seconds", 2)
+            .logged(detail),
             StoreError::Full { .. } => Self::new(
                 Code::StorageFull,
                 "the disk is full; nothing was changed. Writes are taken again by themselves once there is space",

@@ -1,8 +1,10 @@
 //! What happens around every handler: a request id, a span, metrics, and a problem document for whatever failed.
 
 use super::audit::Entry;
-use super::auth::{Access, access_of, authorize};
+use super::auth::{Access, access_of, authorize, is_probe};
+use super::host;
 use super::metrics;
+use super::origin;
 use super::problem::{Code, Problem};
 use super::state::AppState;
 use super::trace_context::{self, trace_parent};
@@ -49,8 +51,12 @@ pub async fn around(State(state): State<AppState>, mut request: Request, next: N
     }
     trace_context::begin(&span, parent, operation);
     let began = Instant::now();
-    let (caller, allowed) = authorize(&state, request.headers(), access);
-    let allowed = allowed.and_then(|()| check_length(&request));
+    let (caller, allowed) = authorize(&state, request.headers(), operation, access);
+    // Whether it is meant for this service comes first: a stranger's page learns nothing about keys.
+    let allowed = host::check(&state, &request, operation)
+        .and_then(|()| origin::check(&state, &request))
+        .and(allowed)
+        .and_then(|()| check_length(&request));
     let response = match allowed {
         Ok(()) => {
             if caller.key.is_some() {
@@ -73,7 +79,7 @@ pub async fn around(State(state): State<AppState>, mut request: Request, next: N
     metrics::count_request(operation, status.as_u16(), took);
     let milliseconds = took.as_secs_f64() * 1e3;
     span.in_scope(|| {
-        if is_probe(operation) {
+        if is_probe(operation) || operation == "get_metrics" {
             tracing::debug!(status = status.as_u16(), milliseconds, "answered");
         } else {
             tracing::info!(status = status.as_u16(), milliseconds, "answered");
@@ -87,6 +93,11 @@ pub async fn around(State(state): State<AppState>, mut request: Request, next: N
     headers.insert(
         header::X_CONTENT_TYPE_OPTIONS,
         HeaderValue::from_static("nosniff"),
+    );
+    // Other sites' pages cannot even embed what needs no leave to be fetched.
+    headers.insert(
+        "cross-origin-resource-policy",
+        HeaderValue::from_static("same-origin"),
     );
     headers
         .entry(header::CONTENT_SECURITY_POLICY)
@@ -157,6 +168,7 @@ fn finish(mut response: Response, id: &str) -> (Response, &'static str) {
 /// A problem for a failure that axum or a layer answered by itself.
 fn from_status(status: StatusCode) -> Problem {
     let code = match status {
+        StatusCode::MISDIRECTED_REQUEST => Code::MisdirectedRequest,
         StatusCode::UNAUTHORIZED => Code::Unauthorized,
         StatusCode::FORBIDDEN => Code::InsufficientScope,
         StatusCode::NOT_FOUND => Code::RouteNotFound,
@@ -193,8 +205,4 @@ fn operation(request: &Request) -> &'static str {
         .get::<MatchedPath>()
         .and_then(|path| super::openapi::operation_id(method, path.as_str()))
         .unwrap_or("unmatched")
-}
-
-fn is_probe(operation: &str) -> bool {
-    matches!(operation, "get_liveness" | "get_readiness" | "get_metrics")
 }

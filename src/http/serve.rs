@@ -1,27 +1,25 @@
 //! From settings to a listening service, and back down in good order.
 //!
 //! A connection is cut where its client dribbles: the head of a request has a time limit, a size limit and, over TLS,
-//! a handshake limit; bodies have theirs in [`super::upload`] and [`super::extract`]. Connections beyond the limit wait
-//! to be served until another one ends.
+//! a handshake limit; bodies have theirs in [`super::upload`] and [`super::extract`]. How many connections there may be
+//! is the matter of [`super::connections`].
 
+use super::connection::{Line, turn_away};
 use super::housekeeping;
-use super::router::router;
+use super::local_access::{LocalAccess, local_url};
 use super::scrubber;
 use super::state::{AppState, OpenError};
-use super::tls::{Tls, TlsError};
+use super::tls::TlsError;
 use crate::store::Health;
-use axum::Router;
-use axum::extract::Request;
-use axum_server::{Handle, Server};
-use std::convert::Infallible;
+use crate::store::error::is_out_of_descriptors;
 use std::future::Future;
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::task::{Context, Poll};
 use std::time::Duration;
-use tokio::net::TcpListener;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tower::Service;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Semaphore;
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
 
 /// Why serving ended early.
 #[derive(Debug, thiserror::Error)]
@@ -32,16 +30,22 @@ pub enum ServeError {
     /// The certificate or its key cannot be used.
     #[error(transparent)]
     Tls(#[from] TlsError),
-    /// The listener failed.
-    #[error("the listener failed: {0}")]
-    Listener(#[from] std::io::Error),
 }
+
+/// How long to wait after a connection could not be accepted.
+const ACCEPT_AGAIN: Duration = Duration::from_millis(50);
+/// How often in a row that is logged.
+const LOG_EVERY: u32 = 200;
+/// Connections at a time that are told why there is no place for them.
+const TURNED_AWAY: usize = 64;
+/// How long connections have to end after they were told to end at once.
+const CUT_WITHIN: Duration = Duration::from_secs(1);
 
 /// Serves until `shutdown` resolves: then no more connections are accepted, open streams end, running requests have
 /// until the deadline, the running job goes back to the queue, and everything is flushed.
 ///
 /// # Errors
-/// [`ServeError`] where the certificate cannot be used or the listener fails.
+/// [`ServeError`] where the certificate cannot be used.
 pub async fn serve(
     state: AppState,
     listener: TcpListener,
@@ -49,24 +53,41 @@ pub async fn serve(
 ) -> Result<(), ServeError> {
     tokio::spawn(housekeeping::run(state.clone()));
     tokio::spawn(scrubber::run(state.clone()));
-    let tls = Tls::load(&state.config)?;
-    let handle = Handle::new();
+    let cut = CancellationToken::new();
+    let line = Arc::new(Line::new(state.clone(), cut.clone())?);
+    let tasks = TaskTracker::new();
+    tokio::select! {
+        never = accept(&line, &listener, &tasks) => match never {},
+        () = shutdown => {}
+    }
+    drop(listener);
+    tracing::info!("shutting down");
+    state.stopping.cancel();
+    tasks.close();
     let deadline = state.config.shutdown_timeout;
-    let stop = async {
-        shutdown.await;
-        tracing::info!("shutting down");
-        state.stopping.cancel();
-        handle.graceful_shutdown(Some(deadline));
-        tokio::time::sleep(deadline).await;
-    };
-    let served = tokio::select! {
-        served = accept(&state, listener, tls, handle.clone()) => served,
-        () = stop => {
-            tracing::warn!(?deadline, "requests were still running at the deadline and are dropped");
-            handle.shutdown();
-            Ok(())
-        }
-    };
+    if tokio::time::timeout(deadline, tasks.wait()).await.is_err() {
+        tracing::warn!(
+            ?deadline,
+            "requests were still running at the deadline and are dropped"
+        );
+        cut.cancel();
+        // What does not end now ends with the runtime.
+        let _ = tokio::time::timeout(CUT_WITHIN, tasks.wait()).await;
+    }
+    close(&state, deadline).await;
+    Ok(())
+}
+
+/// Lets the owner of the data directory find the service and be known to it, until [`serve`] ends. For before anybody is
+/// told that the service listens.
+pub fn announce(state: &AppState, listening: SocketAddr) {
+    let url = local_url(listening, state.config.tls_cert.is_some());
+    if let Err(error) = state.local_token.publish(&state.config.data_dir, url) {
+        tracing::warn!(%error, "the local token was not written; while there is no key, keys are made with the service stopped");
+    }
+}
+
+async fn close(state: &AppState, deadline: Duration) {
     let closing = state.clone();
     let closed = tokio::task::spawn_blocking(move || {
         if !closing.jobs.shutdown(deadline) {
@@ -77,95 +98,60 @@ pub async fn serve(
         {
             tracing::error!(%error, "the last flush failed");
         }
+        if let Err(error) = LocalAccess::remove(&closing.config.data_dir) {
+            tracing::warn!(%error, "the file of the local token was not removed; it is of no use any more");
+        }
     })
     .await;
     if let Err(error) = closed {
         tracing::error!(%error, "closing failed");
     }
-    Ok(served?)
 }
 
-async fn accept(
-    state: &AppState,
-    listener: TcpListener,
-    tls: Tls,
-    handle: Handle<SocketAddr>,
-) -> std::io::Result<()> {
-    let config = &state.config;
-    let connections = Connections {
-        router: router(state.clone()),
-        places: Arc::clone(&state.connections),
-    };
-    let mut server = Server::<SocketAddr>::from_listener(listener)
-        .http1_only()
-        .handle(handle)
-        .first_request_timeout(config.header_timeout);
-    server
-        .http_builder()
-        .http1()
-        .header_read_timeout(Some(config.header_timeout))
-        .max_buf_size(config.max_header_bytes.max(SMALLEST_BUFFER))
-        .keep_alive(true);
-    tls.serve(
-        server,
-        connections,
-        config.header_timeout.max(Duration::from_secs(1)),
-    )
-    .await
-}
-
-/// hyper takes no smaller one.
-const SMALLEST_BUFFER: usize = 8192;
-
-/// Makes the service of each connection, which holds a place until the connection ends.
-#[derive(Clone)]
-pub(super) struct Connections {
-    router: Router,
-    places: Arc<Semaphore>,
-}
-
-impl Service<SocketAddr> for Connections {
-    type Response = Connection;
-    type Error = Infallible;
-    type Future = std::pin::Pin<Box<dyn Future<Output = Result<Connection, Infallible>> + Send>>;
-
-    fn poll_ready(&mut self, _: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
-        Poll::Ready(Ok(()))
-    }
-
-    fn call(&mut self, _: SocketAddr) -> Self::Future {
-        let (router, places) = (self.router.clone(), Arc::clone(&self.places));
-        Box::pin(async move {
-            // Nobody closes the semaphore; without a place the connection would be served all the same.
-            let place = places.acquire_owned().await.ok().map(Arc::new);
-            Ok(Connection {
-                router,
-                _place: place,
-            })
-        })
+async fn accept(line: &Arc<Line>, listener: &TcpListener, tasks: &TaskTracker) -> std::convert::Infallible {
+    let polite = Arc::new(Semaphore::new(TURNED_AWAY));
+    let mut failures = 0_u32;
+    loop {
+        let (socket, peer) = match listener.accept().await {
+            Ok(accepted) => accepted,
+            Err(error) => {
+                accept_failed(line, &error, failures);
+                failures = failures.wrapping_add(1);
+                tokio::time::sleep(ACCEPT_AGAIN).await;
+                continue;
+            }
+        };
+        failures = 0;
+        match line.state.connections.admit(peer.ip()).await {
+            Some(place) => {
+                let line = Arc::clone(line);
+                tasks.spawn(async move { line.serve(socket, peer, place).await });
+            }
+            None => tell(line, socket, peer, &polite),
+        }
     }
 }
 
-/// The routes, as one connection sees them.
-#[derive(Clone)]
-pub(super) struct Connection {
-    router: Router,
-    _place: Option<Arc<OwnedSemaphorePermit>>,
+/// The system gave no connection. Where it has no descriptors left, an idle connection makes way.
+fn accept_failed(line: &Line, error: &std::io::Error, before: u32) {
+    if is_out_of_descriptors(error) {
+        line.state.connections.dismiss_oldest();
+    }
+    if before % LOG_EVERY == 0 {
+        tracing::warn!(%error, "a connection could not be accepted; trying again");
+    }
 }
 
-impl<B> Service<Request<B>> for Connection
-where
-    Router: Service<Request<B>>,
-{
-    type Response = <Router as Service<Request<B>>>::Response;
-    type Error = <Router as Service<Request<B>>>::Error;
-    type Future = <Router as Service<Request<B>>>::Future;
-
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
-        Service::<Request<B>>::poll_ready(&mut self.router, context)
+/// An address that has all its connections busy gets no other, and is told so where few are being told at the moment.
+fn tell(line: &Arc<Line>, socket: TcpStream, peer: SocketAddr, polite: &Arc<Semaphore>) {
+    tracing::debug!(%peer, "the address has as many busy connections as it may; another was closed");
+    if line.is_encrypted() {
+        return;
     }
-
-    fn call(&mut self, request: Request<B>) -> Self::Future {
-        Service::<Request<B>>::call(&mut self.router, request)
+    if let Ok(permit) = Arc::clone(polite).try_acquire_owned() {
+        tokio::spawn(async move {
+            turn_away(socket).await;
+            drop(permit);
+        });
     }
 }

@@ -4,8 +4,10 @@ use super::admission::{Compute, ComputeOptions};
 use super::audit::Audit;
 use super::auth;
 use super::config::ServiceConfig;
+use super::connections::Connections;
 use super::keyring::Keyring;
 use super::limits::Limits;
+use super::local_access::LocalToken;
 use super::problem::Problem;
 use super::{audit, metrics, openapi, problem_from, recovery_mode};
 use crate::jobs::{JobError, Jobs};
@@ -14,7 +16,6 @@ use crate::store::{Damage, Health, Store, StoreError};
 use std::net::SocketAddr;
 use std::ops::Deref;
 use std::sync::{Arc, Mutex};
-use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 /// Why the service did not start.
@@ -26,7 +27,10 @@ pub enum OpenError {
     /// The job queue could not be started.
     #[error(transparent)]
     Jobs(#[from] JobError),
-    /// The system gives no threads.
+    /// The system gives no threads for answering.
+    #[error("the service's threads could not be started: {0}")]
+    Runtime(std::io::Error),
+    /// The system gives no threads for queries.
     #[error("the query threads could not be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// Anyone could use it.
@@ -40,6 +44,9 @@ pub enum OpenError {
         /// Its data directory.
         data: std::path::PathBuf,
     },
+    /// The system gives no randomness.
+    #[error("there is no randomness for the local token: {0}")]
+    Randomness(rand::rand_core::OsError),
     /// The API's document could not be written.
     #[error("the OpenAPI document could not be written: {0}")]
     Document(String),
@@ -61,8 +68,10 @@ pub struct Parts {
     pub limits: Limits,
     /// Who changed what.
     pub audit: Audit,
-    /// Places for connections.
-    pub connections: Arc<Semaphore>,
+    /// The connections there are.
+    pub connections: Arc<Connections>,
+    /// Lets the owner of the data directory in while there is no key.
+    pub local_token: LocalToken,
     /// The job queue and the live index.
     pub jobs: Jobs,
     /// Where requests compute.
@@ -180,9 +189,8 @@ impl AppState {
             keys,
             limits: Limits::new(config.key_limits),
             audit,
-            connections: Arc::new(Semaphore::new(
-                config.max_connections.clamp(1, Semaphore::MAX_PERMITS),
-            )),
+            connections: Arc::new(Connections::new(config.connection_limits())),
+            local_token: LocalToken::new().map_err(OpenError::Randomness)?,
             jobs,
             compute,
             catalogue: Mutex::new(()),

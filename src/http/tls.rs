@@ -1,11 +1,7 @@
 //! HTTPS by the service itself, where it was built with the feature `tls`.
 
 use super::config::ServiceConfig;
-use super::serve::Connections;
-use axum_server::Server;
-use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::time::Duration;
 
 /// Why there is no HTTPS.
 #[derive(Debug, thiserror::Error)]
@@ -34,7 +30,7 @@ pub(super) enum Tls {
     Off,
     /// With this certificate.
     #[cfg(feature = "tls")]
-    On(axum_server::tls_rustls::RustlsConfig),
+    On(tokio_rustls::TlsAcceptor),
 }
 
 impl Tls {
@@ -81,29 +77,6 @@ impl Tls {
             .with_single_cert(chain, private)
             .map_err(|e| fail(&key, e.to_string()))?;
         server.alpn_protocols = vec![b"http/1.1".to_vec()];
-        Ok(Self::On(axum_server::tls_rustls::RustlsConfig::from_config(
-            Arc::new(server),
-        )))
-    }
-
-    /// Accepts connections until the server's handle is told to stop.
-    ///
-    /// # Errors
-    /// Where the listener fails.
-    pub async fn serve(
-        self,
-        server: Server<SocketAddr>,
-        connections: Connections,
-        #[cfg_attr(not(feature = "tls"), allow(unused_variables))] handshake: Duration,
-    ) -> std::io::Result<()> {
-        match self {
-            Self::Off => server.serve(connections).await,
-            #[cfg(feature = "tls")]
-            Self::On(config) => {
-                let acceptor =
-                    axum_server::tls_rustls::RustlsAcceptor::new(config).handshake_timeout(handshake);
-                server.acceptor(acceptor).serve(connections).await
-            }
-        }
+        Ok(Self::On(tokio_rustls::TlsAcceptor::from(Arc::new(server))))
     }
 }

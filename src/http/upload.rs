@@ -4,6 +4,7 @@ use super::archive::{self, ArchiveKind, ArchiveLimits};
 use super::problem::{Code, Problem};
 use super::uploaded::{Part, UploadedMesh};
 use crate::mesh::{Format, MeshError};
+use crate::model::text::is_hidden;
 use axum::extract::{FromRequest, Multipart, Request};
 use axum::http::{HeaderMap, header};
 use bytes::BytesMut;
@@ -267,7 +268,7 @@ fn sort(parts: Vec<Part>, limits: &UploadLimits) -> Result<Upload, Problem> {
     let meshes = meshes
         .into_iter()
         .map(|file| UploadedMesh {
-            name: file.name,
+            name: file.name.replace(is_hidden, ""),
             media_type: file.media_type.filter(|t| Format::from_media_type(t).is_some()),
             bytes: file.bytes,
             buffers: buffers.clone(),
@@ -305,7 +306,7 @@ fn disposition_name(headers: &HeaderMap) -> Option<String> {
     })
 }
 
-/// A name as it is kept: no folders from outside, no control characters, at most 200 characters.
+/// A name as it is kept: no folders from outside, no hidden characters, at most 200 characters.
 fn clean_name(name: Option<&str>) -> String {
     let name: String = name
         .unwrap_or_default()
@@ -313,7 +314,7 @@ fn clean_name(name: Option<&str>) -> String {
         .next()
         .unwrap_or_default()
         .chars()
-        .filter(|c| !c.is_control())
+        .filter(|&c| !is_hidden(c))
         .take(200)
         .collect();
     let name = name.trim();

@@ -14,6 +14,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+/// The code of a file that could not be opened because too many are.
+const OUT_OF_DESCRIPTORS: &str = "out_of_descriptors";
+
 /// Why a shape has no description.
 #[derive(Clone, Debug)]
 pub(super) struct Failure {
@@ -27,6 +30,11 @@ impl Failure {
             code,
             detail: detail.into(),
         }
+    }
+
+    /// Whether the same shape may well be described a moment later.
+    pub(super) fn is_passing(&self) -> bool {
+        self.code == OUT_OF_DESCRIPTORS
     }
 
     pub(super) fn of(&self, shape: &Shape) -> FailedShape {
@@ -115,8 +123,13 @@ impl Describer<'_> {
         if self.cancel.is_cancelled() {
             return Err(ReindexError::Cancelled);
         }
+        let failures = failures.into_inner().unwrap_or_default();
+        // The file is fine; without it the class would be learnt from less than it has.
+        if let Some(failure) = failures.values().find(|failure| failure.is_passing()) {
+            return Err(ReindexError::Later(failure.detail.clone()));
+        }
         Ok(Described {
-            failures: failures.into_inner().unwrap_or_default(),
+            failures,
             computed: computed.into_inner(),
             cached: cached.into_inner(),
         })
@@ -203,6 +216,7 @@ fn original_failure(error: &StoreError) -> &'static str {
         } => "original_missing",
         StoreError::Original { .. } => "original_damaged",
         StoreError::Denied { .. } => "storage_denied",
+        StoreError::OutOfDescriptors { .. } => OUT_OF_DESCRIPTORS,
         _ => "file_unreadable",
     }
 }

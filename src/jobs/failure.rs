@@ -10,6 +10,8 @@ use std::any::Any;
 pub(super) enum ReindexError {
     /// Somebody asked it to stop.
     Cancelled,
+    /// It cannot be done now, for want of what others will give back.
+    Later(String),
     /// It cannot be done.
     Failed(JobFailure),
 }
@@ -26,6 +28,7 @@ impl ReindexError {
 impl From<StoreError> for ReindexError {
     fn from(error: StoreError) -> Self {
         let code = match &error {
+            StoreError::OutOfDescriptors { .. } => return Self::Later(error.to_string()),
             StoreError::Full { .. } => "storage_full",
             StoreError::ReadOnly { .. } => "storage_read_only",
             StoreError::Denied { .. } => "storage_denied",

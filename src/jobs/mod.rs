@@ -87,6 +87,8 @@ struct State {
     behind: behind::Behind,
     /// Whether jobs are refused because the store as a whole is being changed.
     paused: bool,
+    /// No job is begun before this moment.
+    not_before: Option<Instant>,
     stopping: bool,
     stopped: bool,
 }

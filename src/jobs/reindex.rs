@@ -181,6 +181,7 @@ fn learn_class(
         match describer.description(shape) {
             Ok(description) => descriptions.push((shape, description)),
             Err(_) if request.cancel.is_cancelled() => return Err(ReindexError::Cancelled),
+            Err(failure) if failure.is_passing() => return Err(ReindexError::Later(failure.detail)),
             Err(failure) => failed.push(failure.of(shape)),
         }
     }

@@ -10,7 +10,7 @@ use crate::store::{Health, StoreError};
 use jiff::Timestamp;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
 /// A job that was running at that many crashes is not tried again.
@@ -18,6 +18,9 @@ const MAX_ATTEMPTS: u32 = 3;
 
 /// How often a worker with jobs looks whether the store takes writes again.
 const LOOK_AGAIN: Duration = Duration::from_millis(200);
+
+/// How long a job waits that could not be done for want of file descriptors.
+const TRY_AGAIN_AFTER: Duration = Duration::from_secs(2);
 
 /// Puts the jobs a former process left unfinished back into the queue.
 pub(super) fn requeue_interrupted(inner: &Inner) -> Result<(), JobError> {
@@ -102,8 +105,9 @@ fn next(inner: &Inner) -> Option<(JobId, watch::Sender<Job>, Cancel)> {
         if state.stopping {
             return None;
         }
-        // A job begun now could not write what it learns. It waits for the disk; queries go on.
-        if !state.waiting.is_empty() && inner.store.health() != Health::Ready {
+        // A job begun now could not write what it learns, or not read what it learns from. It waits; queries go on.
+        let too_early = state.not_before.is_some_and(|moment| Instant::now() < moment);
+        if !state.waiting.is_empty() && (too_early || inner.store.health() != Health::Ready) {
             state = inner
                 .changed
                 .wait_timeout(state, LOOK_AGAIN)
@@ -174,6 +178,15 @@ fn finish(inner: &Inner, id: JobId, channel: &watch::Sender<Job>, ended: Result<
             job.steps.clear();
         }
         Err(ReindexError::Cancelled) => job.state = JobState::Canceled,
+        Err(ReindexError::Later(_)) if on_request => job.state = JobState::Canceled,
+        Err(ReindexError::Later(why)) => {
+            tracing::warn!(job = %id, why, "a job cannot be done now and is tried again");
+            job.state = JobState::Enqueued;
+            job.attempts = job.attempts.saturating_sub(1);
+            job.steps.clear();
+            state.waiting.push_front(id);
+            state.not_before = Some(Instant::now() + TRY_AGAIN_AFTER);
+        }
         Err(ReindexError::Failed(failure)) => {
             tracing::warn!(job = %id, code = failure.code, detail = failure.detail, "a job failed");
             job.state = JobState::Failed;

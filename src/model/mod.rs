@@ -11,6 +11,7 @@ pub mod job;
 pub mod key;
 pub mod shape;
 pub mod snapshot;
+pub mod text;
 
 pub use class::{Class, ClassName, ClassNameError};
 pub use generation::{Generation, GenerationClass, GenerationShape};

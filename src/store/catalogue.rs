@@ -2,7 +2,7 @@
 
 use super::event::{Event, files_of, get, shapes_of};
 use super::payload::{IdentityLink, NameLink, OwnerLink};
-use super::{Batch, Statistics, Store, StoreError, Writer, keys, record};
+use super::{Batch, Maker, Statistics, Store, StoreError, Writer, keys, record};
 use crate::model::{Class, ClassId, ClassName, CompanionFile, ContentHash, NewShape, Shape, ShapeId};
 use jiff::Timestamp;
 use std::collections::{BTreeMap, BTreeSet};
@@ -37,8 +37,17 @@ impl Store {
     /// # Errors
     /// [`StoreError::NameTaken`]; [`StoreError::ReadOnly`]; the write's failure.
     pub fn create_class(&self, name: ClassName) -> Result<Class, StoreError> {
+        self.create_class_by(None, name)
+    }
+
+    /// Makes a class without shapes, on account of an API key.
+    ///
+    /// # Errors
+    /// As [`Store::create_class`]; [`StoreError::QuotaExceeded`].
+    pub fn create_class_by(&self, maker: Option<&Maker>, name: ClassName) -> Result<Class, StoreError> {
         let mut writer = self.inner.writer();
         self.require_free(&name)?;
+        self.require_quota(&writer, maker, 1, &[])?;
         let id = ClassId::new();
         self.happen(
             &mut writer,
@@ -46,6 +55,7 @@ impl Store {
                 id,
                 name,
                 at: Timestamp::now(),
+                made_by: maker.map(|maker| maker.key),
             },
         )?;
         self.class(id)
@@ -132,6 +142,19 @@ impl Store {
     /// # Errors
     /// [`StoreError::NoClass`]; [`StoreError::Full`]; [`StoreError::ReadOnly`]; the write's failure.
     pub fn add_shapes(&self, class: ClassId, shapes: Vec<NewShape>) -> Result<Vec<AddedShape>, StoreError> {
+        self.add_shapes_by(None, class, shapes)
+    }
+
+    /// Adds shapes to a class, on account of an API key. Shapes the class has already count nothing.
+    ///
+    /// # Errors
+    /// As [`Store::add_shapes`]; [`StoreError::QuotaExceeded`].
+    pub fn add_shapes_by(
+        &self,
+        maker: Option<&Maker>,
+        class: ClassId,
+        shapes: Vec<NewShape>,
+    ) -> Result<Vec<AddedShape>, StoreError> {
         self.inner.writable()?;
         self.class(class)?;
         let gate = self.inner.files.read().unwrap_or_else(PoisonError::into_inner);
@@ -144,8 +167,16 @@ impl Store {
                 self.class(class)?;
                 let added = self.told_apart(class, candidates)?;
                 let shapes = fresh(&added);
+                self.require_quota(&writer, maker, 0, &shapes)?;
                 if !shapes.is_empty() {
-                    self.happen(&mut writer, &Event::ShapesAdded { class, shapes, at })?;
+                    let made_by = maker.map(|maker| maker.key);
+                    let event = Event::ShapesAdded {
+                        class,
+                        shapes,
+                        at,
+                        made_by,
+                    };
+                    self.happen(&mut writer, &event)?;
                 }
                 Ok(added)
             });
@@ -165,6 +196,19 @@ impl Store {
         name: ClassName,
         shapes: Vec<NewShape>,
     ) -> Result<Vec<AddedShape>, StoreError> {
+        self.create_filled_class_by(None, name, shapes)
+    }
+
+    /// Makes a class with its first shapes, on account of an API key.
+    ///
+    /// # Errors
+    /// As [`Store::create_filled_class`]; [`StoreError::QuotaExceeded`].
+    pub fn create_filled_class_by(
+        &self,
+        maker: Option<&Maker>,
+        name: ClassName,
+        shapes: Vec<NewShape>,
+    ) -> Result<Vec<AddedShape>, StoreError> {
         self.inner.writable()?;
         self.require_free(&name)?;
         let gate = self.inner.files.read().unwrap_or_else(PoisonError::into_inner);
@@ -177,7 +221,16 @@ impl Store {
                 self.require_free(&name)?;
                 let added = self.told_apart(id, candidates)?;
                 let shapes = fresh(&added);
-                self.happen(&mut writer, &Event::ClassFilled { id, name, shapes, at })?;
+                self.require_quota(&writer, maker, 1, &shapes)?;
+                let made_by = maker.map(|maker| maker.key);
+                let event = Event::ClassFilled {
+                    id,
+                    name,
+                    shapes,
+                    at,
+                    made_by,
+                };
+                self.happen(&mut writer, &event)?;
                 Ok(added)
             });
         drop(gate);

@@ -7,7 +7,7 @@
 use super::event::Event;
 use super::{StoreError, files};
 use serde::{Deserialize, Serialize};
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
@@ -129,7 +129,7 @@ impl CatalogueLog {
     /// A failure of the file system.
     pub fn open(path: &Path, good_length: u64) -> Result<Self, StoreError> {
         let fail = |e: std::io::Error| StoreError::io(format!("open {}", path.display()), &e);
-        let file = OpenOptions::new()
+        let file = files::options()
             .create(true)
             .append(true)
             .open(path)
@@ -217,7 +217,7 @@ impl CatalogueLog {
             text.extend_from_slice(&format(sequence, event)?);
         }
         files::write_durably(&self.path, &text)?;
-        let file = OpenOptions::new().append(true).open(&self.path).map_err(fail)?;
+        let file = files::options().append(true).open(&self.path).map_err(fail)?;
         self.file = Some(file);
         self.length = text.len() as u64;
         Ok(())

@@ -1,5 +1,6 @@
 //! Why the store could not do what it was asked.
 
+use super::usage::Quota;
 use crate::model::{ClassId, ClassName, ContentHash, JobId, KeyId, KeyName, ShapeId, SnapshotId};
 use std::fmt;
 use std::path::PathBuf;
@@ -67,6 +68,24 @@ pub enum StoreError {
     BadSnapshot {
         /// What is wrong with it.
         detail: String,
+    },
+    /// An API key may have no more of something. Nothing was changed.
+    #[error("the API key may have {limit} {quota}; it has {used}, and this would add {more}")]
+    QuotaExceeded {
+        /// What there may be no more of.
+        quota: Quota,
+        /// The most there may be.
+        limit: u64,
+        /// What there is.
+        used: u64,
+        /// What would be added.
+        more: u64,
+    },
+    /// The process has as many files open as it may. Nothing was changed.
+    #[error("no more files can be opened at the moment: {what}")]
+    OutOfDescriptors {
+        /// What was being done.
+        what: String,
     },
     /// The disk is full. Nothing was changed.
     #[error("the disk is full: {detail}")]
@@ -141,9 +160,12 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    /// Wraps a file system error, telling a full disk and a missing right apart.
+    /// Wraps a file system error, telling a full disk, a missing right and a want of file descriptors apart.
     pub(crate) fn io(what: impl Into<String>, error: &std::io::Error) -> Self {
         let what = what.into();
+        if is_out_of_descriptors(error) {
+            return Self::OutOfDescriptors { what };
+        }
         match error.kind() {
             std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
                 Self::Full { detail: what }
@@ -191,5 +213,41 @@ impl fmt::Display for OriginalDamage {
             Self::Changed => "does not hold what was uploaded",
             Self::Unreadable => "cannot be read",
         })
+    }
+}
+
+/// Whether the process (`EMFILE`) or the system (`ENFILE`) has as many files open as it may.
+pub(crate) fn is_out_of_descriptors(error: &std::io::Error) -> bool {
+    const ENFILE: i32 = 23;
+    const EMFILE: i32 = 24;
+    let told = match error.raw_os_error() {
+        Some(code) => [ENFILE, EMFILE].contains(&code),
+        // `tempfile` puts the path around the system's error, whose number is in the text only.
+        None => {
+            let text = error.to_string();
+            [ENFILE, EMFILE]
+                .iter()
+                .any(|code| text.contains(&format!("(os error {code})")))
+        }
+    };
+    cfg!(unix) && told
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_want_of_descriptors_is_told_apart_also_inside_another_error() {
+        for code in [23, 24] {
+            let bare = std::io::Error::from_raw_os_error(code);
+            let wrapped = std::io::Error::other(format!("{bare} at path \"/x\""));
+            for error in [bare, wrapped] {
+                let told = StoreError::io("write", &error);
+                assert!(matches!(told, StoreError::OutOfDescriptors { .. }), "{error}");
+            }
+        }
+        let other = StoreError::io("write", &std::io::Error::from_raw_os_error(2));
+        assert!(matches!(other, StoreError::Io { .. }));
     }
 }

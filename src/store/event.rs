@@ -5,6 +5,7 @@
 use super::backend::{Backend, Batch};
 use super::payload::{IdentityLink, NameLink, Number, OwnerLink, ReferenceLink};
 use super::record::{Record, seal, unseal};
+use super::usage::{note_class, note_shape};
 use super::{StoreError, keys};
 use crate::model::{ApiKey, Class, ClassId, ClassName, ContentHash, KeyId, Shape, ShapeId};
 use crate::parameters::Parameters;
@@ -20,6 +21,9 @@ pub enum Event {
         id: ClassId,
         name: ClassName,
         at: Timestamp,
+        /// The API key it was made with, for quotas.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        made_by: Option<KeyId>,
     },
     /// A class was made together with its first shapes, so that a crash leaves no empty class behind.
     ClassFilled {
@@ -27,6 +31,9 @@ pub enum Event {
         name: ClassName,
         shapes: Vec<Shape>,
         at: Timestamp,
+        /// The API key it was made with, for quotas.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        made_by: Option<KeyId>,
     },
     /// A class got another name.
     ClassRenamed {
@@ -41,6 +48,9 @@ pub enum Event {
         class: ClassId,
         shapes: Vec<Shape>,
         at: Timestamp,
+        /// The API key they were made with, for quotas.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        made_by: Option<KeyId>,
     },
     /// Shapes of a class went.
     ShapesDeleted {
@@ -117,21 +127,35 @@ pub(super) fn stage(backend: &dyn Backend, event: &Event) -> Result<Batch, Store
     let mut batch = Batch::default();
     let read_class = |id: ClassId| get::<Class>(backend, &keys::class(id));
     match event {
-        Event::ClassCreated { id, name, at } => {
+        Event::ClassCreated {
+            id,
+            name,
+            at,
+            made_by,
+        } => {
             if read_class(*id)?.is_none() {
                 put(&mut batch, keys::class(*id), &new_class(*id, name, *at))?;
                 put(&mut batch, keys::name(name), &NameLink::to_class(*id))?;
+                note_class(&mut batch, *made_by, *id)?;
             }
         }
-        Event::ClassFilled { id, name, shapes, at } => {
+        Event::ClassFilled {
+            id,
+            name,
+            shapes,
+            at,
+            made_by,
+        } => {
             if read_class(*id)?.is_none() {
                 let mut class = new_class(*id, name, *at);
                 for shape in shapes {
                     put_shape(&mut batch, shape)?;
+                    note_shape(&mut batch, *made_by, shape)?;
                     class.shapes += 1;
                     class.bytes += shape.bytes;
                 }
                 put(&mut batch, keys::name(name), &NameLink::to_class(*id))?;
+                note_class(&mut batch, *made_by, *id)?;
                 touch(&mut batch, class, 0, *at)?;
             }
         }
@@ -153,12 +177,18 @@ pub(super) fn stage(backend: &dyn Backend, event: &Event) -> Result<Batch, Store
                 }
             }
         }
-        Event::ShapesAdded { class, shapes, at } => {
+        Event::ShapesAdded {
+            class,
+            shapes,
+            at,
+            made_by,
+        } => {
             if let Some(mut class) = read_class(*class)? {
                 let before = class.shapes;
                 for shape in shapes {
                     if backend.get(&keys::owner(shape.id))?.is_none() {
                         put_shape(&mut batch, shape)?;
+                        note_shape(&mut batch, *made_by, shape)?;
                         class.shapes += 1;
                         class.bytes += shape.bytes;
                     }

@@ -1,9 +1,27 @@
 //! Files that are there whole or not at all.
 
 use super::StoreError;
-use std::fs::File;
+use std::fs::{DirBuilder, File, OpenOptions};
 use std::io::Write;
 use std::path::Path;
+
+/// Makes a directory of the data directory, with those above it, for its owner only.
+pub(super) fn create_directory(path: &Path) -> std::io::Result<()> {
+    let mut builder = DirBuilder::new();
+    builder.recursive(true);
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+    builder.create(path)
+}
+
+/// How files of the data directory are opened: what is made is for its owner only.
+pub(super) fn options() -> OpenOptions {
+    #[cfg_attr(not(unix), allow(unused_mut))]
+    let mut options = OpenOptions::new();
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    options
+}
 
 /// Waits until a directory's entries are on the disk.
 pub(super) fn sync_directory(path: &Path) -> Result<(), StoreError> {
@@ -27,7 +45,7 @@ fn write(path: &Path, bytes: &[u8], durable: bool) -> Result<(), StoreError> {
     let fail = |e: std::io::Error| StoreError::io(format!("write {}", path.display()), &e);
     let directory = path.parent().unwrap_or(Path::new("."));
     if !directory.exists() {
-        std::fs::create_dir_all(directory).map_err(fail)?;
+        create_directory(directory).map_err(fail)?;
         if durable && let Some(parent) = directory.parent() {
             sync_directory(parent)?;
         }

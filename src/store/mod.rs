@@ -36,6 +36,7 @@ mod ordered_map;
 mod originals;
 mod payload;
 mod payload_jobs;
+mod private;
 mod rebuild;
 pub mod record;
 mod records;
@@ -60,7 +61,7 @@ pub use memory_backend::MemoryBackend;
 pub use migrate::FORMAT;
 pub use originals::CheckedFile;
 pub use scrub::ScrubReport;
-pub use usage::Usage;
+pub use usage::{Maker, Quota, Usage};
 
 use backend::Batch;
 use catalogue_log::CatalogueLog;

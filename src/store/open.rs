@@ -10,7 +10,9 @@ use super::payload::Number;
 use super::records::Records;
 use super::replay::{replay, sequence};
 use super::standby::Standby;
-use super::{Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, rebuild, scrub, snapshot};
+use super::{
+    Inner, Store, StoreError, StoreOptions, Writer, files, keys, migrate, private, rebuild, scrub, snapshot,
+};
 use crate::model::Class;
 use std::fs::{File, TryLockError};
 use std::path::Path;
@@ -49,6 +51,7 @@ impl Store {
             }
             Err(other) => return Err(other),
         };
+        private::close_to_others(path)?;
         failure.acknowledge(writer.sequence);
         // Read-only until there is space, where there is none.
         if failure.get().is_none()
@@ -77,6 +80,7 @@ impl Store {
         rebuild::verify(&*backend)?;
         let mut recovery = Vec::new();
         let writer = settle(path, &*backend, &mut recovery)?;
+        private::close_to_others(path)?;
         failure.acknowledge(writer.sequence);
         Ok(Parts {
             path,
@@ -164,14 +168,23 @@ fn prepare(path: &Path, failure: &Failure) -> Result<File, StoreError> {
         );
         require_space(place, &what)?;
     }
-    std::fs::create_dir_all(path).map_err(fail)?;
+    if let Some(parent) = path.parent().filter(|_| !path.exists()) {
+        std::fs::create_dir_all(parent).map_err(fail)?;
+    }
+    files::create_directory(path).map_err(fail)?;
     let lock_path = path.join("lock");
-    let lock = File::create(&lock_path).map_err(|e| {
-        StoreError::io(
-            format!("open the data directory: open {}", lock_path.display()),
-            &e,
-        )
-    })?;
+    let mut lock = files::options();
+    let lock = lock
+        .write(true)
+        .create(true)
+        .truncate(false)
+        .open(&lock_path)
+        .map_err(|e| {
+            StoreError::io(
+                format!("open the data directory: open {}", lock_path.display()),
+                &e,
+            )
+        })?;
     match lock.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
@@ -183,6 +196,7 @@ fn prepare(path: &Path, failure: &Failure) -> Result<File, StoreError> {
     }
     // A disk that is full still opens, if it can: with what the reserve held.
     failure.give_up_reserve();
+    private::close_to_others(path)?;
     snapshot::finish_restore(path)?;
     if migrate::check_format(path)? != Format::Current {
         match migrate::write_format(path) {

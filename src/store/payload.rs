@@ -178,7 +178,7 @@ impl Record for Class {
         let v: ClassV1 = unpack(payload)?;
         Ok(Self {
             id: ClassId::from_bytes(v.id),
-            name: ClassName::new(&v.name).map_err(|e| e.to_string())?,
+            name: ClassName::stored(&v.name).map_err(|e| e.to_string())?,
             revision: v.revision,
             shapes: v.shapes,
             bytes: v.bytes,

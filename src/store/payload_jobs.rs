@@ -90,7 +90,7 @@ impl Record for Generation {
             .map(|c| {
                 Ok(GenerationClass {
                     class: ClassId::from_bytes(c.class),
-                    name: ClassName::new(&c.name).map_err(|e| e.to_string())?,
+                    name: ClassName::stored(&c.name).map_err(|e| e.to_string())?,
                     revision: c.revision,
                     shapes: c.shapes as usize,
                     dictionary: c.dictionary,

@@ -1,12 +1,14 @@
 //! What was made with which API key, for quotas.
 //!
-//! A record per class and shape, under the key that made it. It is written after the class or shape it is about, and
-//! removed when a count finds that gone, so a count is exact except for what a crash cut off in between.
+//! A record per class and shape, under the key that made it. It is written in the same batch as the class or shape it is
+//! about, and removed when a count finds that gone. The catalogue log names the key too, so a change that is replayed
+//! counts as well.
 
 use super::event::{get, put};
 use super::payload::{Number, OwnerLink};
-use super::{Batch, Store, StoreError, keys, record};
-use crate::model::{ClassId, KeyId, Shape, ShapeId};
+use super::{Batch, Store, StoreError, Writer, keys, record};
+use crate::model::{ClassId, KeyId, KeyLimits, Shape, ShapeId};
+use std::fmt;
 
 /// How much of the catalogue was made with an API key.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,23 +21,97 @@ pub struct Usage {
     pub bytes: u64,
 }
 
+/// The API key something is made with, and how much may be made with it in all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Maker {
+    /// The key.
+    pub key: KeyId,
+    /// Its limits; what is `None` has none.
+    pub limits: KeyLimits,
+}
+
+/// What an API key may have a limited amount of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quota {
+    /// Classes.
+    Classes,
+    /// Bytes of the shapes' files.
+    StoredBytes,
+}
+
+impl Quota {
+    /// Its name on the wire.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Classes => "classes",
+            Self::StoredBytes => "stored_bytes",
+        }
+    }
+}
+
+impl fmt::Display for Quota {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Classes => "classes",
+            Self::StoredBytes => "bytes of shapes",
+        })
+    }
+}
+
+/// Notes that a class was made with a key.
+pub(super) fn note_class(batch: &mut Batch, key: Option<KeyId>, class: ClassId) -> Result<(), StoreError> {
+    match key {
+        Some(key) => put(batch, keys::used_class(key, class), &Number(0)),
+        None => Ok(()),
+    }
+}
+
+/// Notes that a shape was made with a key.
+pub(super) fn note_shape(batch: &mut Batch, key: Option<KeyId>, shape: &Shape) -> Result<(), StoreError> {
+    match key {
+        Some(key) => put(batch, keys::used_shape(key, shape.id), &Number(shape.bytes)),
+        None => Ok(()),
+    }
+}
+
 impl Store {
-    /// Remembers that a class and shapes were made with a key.
+    /// Whether `classes` more classes and `shapes` may be made with a key. The writer's lock is held from here to the
+    /// change, so no other change comes in between.
     ///
     /// # Errors
-    /// [`StoreError::ReadOnly`], or the write's failure.
-    pub fn note_usage(&self, key: KeyId, class: Option<ClassId>, shapes: &[Shape]) -> Result<(), StoreError> {
-        let mut batch = Batch::default();
-        if let Some(class) = class {
-            put(&mut batch, keys::used_class(key, class), &Number(0))?;
-        }
-        for shape in shapes {
-            put(&mut batch, keys::used_shape(key, shape.id), &Number(shape.bytes))?;
-        }
-        if batch.is_empty() {
+    /// [`StoreError::QuotaExceeded`]; what keeps the records from being read.
+    pub(super) fn require_quota(
+        &self,
+        _: &Writer,
+        maker: Option<&Maker>,
+        classes: u64,
+        shapes: &[Shape],
+    ) -> Result<(), StoreError> {
+        let Some(maker) = maker else { return Ok(()) };
+        let most = maker.limits;
+        if most.classes.is_none() && most.stored_bytes.is_none() {
             return Ok(());
         }
-        self.inner.commit_lazily(&batch)
+        let used = self.usage(maker.key)?;
+        let bytes = shapes.iter().map(|shape| shape.bytes).sum();
+        let checks = [
+            (Quota::Classes, most.classes, used.classes, classes),
+            (Quota::StoredBytes, most.stored_bytes, used.bytes, bytes),
+        ];
+        for (quota, limit, used, more) in checks {
+            if let Some(limit) = limit
+                && more > 0
+                && used.saturating_add(more) > limit
+            {
+                return Err(StoreError::QuotaExceeded {
+                    quota,
+                    limit,
+                    used,
+                    more,
+                });
+            }
+        }
+        Ok(())
     }
 
     /// What was made with a key and is still there.

@@ -6,6 +6,7 @@ mod configuration;
 mod keys;
 mod readme;
 mod service;
+mod strangers;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

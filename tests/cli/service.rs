@@ -262,7 +262,8 @@ fn a_snapshot_goes_to_a_file_and_back_into_a_fresh_directory_and_a_running_servi
     assert_eq!(rank(&["--data", "two"]), before);
 
     let service = Service::start(dir.path(), &["--data", "three"]);
-    let server = ["--server", service.url.as_str()];
+    // The token that a restore takes is in the directory.
+    let server = ["--server", service.url.as_str(), "--data", "three"];
     answer(
         dir.path(),
         &[&["snapshot", "restore", "all.tar.zst"], &server[..]].concat(),

@@ -127,3 +127,123 @@ async fn shapes_are_listed_downloaded_once_and_deleted() {
         .fails(404, "shape_not_found");
     assert_eq!(app.get("/v1/classes/bean").await.value()["shapes"], 2);
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn names_that_mislead_are_refused_by_every_way_to_make_one() {
+    let app = App::new();
+    let dog = app
+        .json("POST", "/v1/classes", json!({"name": "dog"}))
+        .await
+        .value();
+    let id = dog["id"].as_str().unwrap();
+    let refused = [
+        "",
+        " ",
+        ".",
+        "..",
+        "a/b",
+        "/",
+        "a\\b",
+        "\rabc",
+        "abc\n",
+        "a\0b",
+        "\u{200b}dog",
+        "dog\u{202e}",
+        "d\u{2066}og",
+        "dog\u{feff}",
+        "\u{2028}dog",
+        "dog\u{ad}",
+        "dog\u{3164}",
+        "dog\u{fe0f}",
+        id,
+        &id.to_uppercase(),
+        &id.replace('-', ""),
+        "00000000-0000-0000-0000-000000000000",
+    ];
+    for name in refused {
+        let answers = [
+            app.json("POST", "/v1/classes", json!({ "name": name })).await,
+            app.json("PATCH", "/v1/classes/dog", json!({ "name": name }))
+                .await,
+        ];
+        for answer in answers {
+            answer.fails(422, "invalid_name");
+        }
+        let path: String = name.bytes().map(|byte| format!("%{byte:02X}")).collect();
+        // These are the class itself, and what an address has no room for.
+        if name.is_empty() || name.eq_ignore_ascii_case(id) || name == id.replace('-', "") {
+            continue;
+        }
+        let path = format!("/v1/classes/{path}/shapes?create=true");
+        let upload = app.post(&path, "model/off", off("bean", 0)).await;
+        assert_eq!(upload.problem(), (422, "invalid_name".to_owned()), "{name:?}");
+    }
+    let classes = app.get("/v1/classes").await.value();
+    assert_eq!(classes["items"].as_array().unwrap().len(), 1);
+    for name in ["猫 (2)", "été", "a.b", "...", "🦊", "\u{1f469}"] {
+        let made = app.json("POST", "/v1/classes", json!({ "name": name })).await;
+        assert_eq!(made.status, 201, "{name}: {}", made.text());
+    }
+    // The same name in another spelling of Unicode.
+    app.json("POST", "/v1/classes", json!({"name": "e\u{301}te\u{301}"}))
+        .await
+        .fails(409, "class_exists");
+    assert_eq!(
+        app.get("/v1/classes/e%CC%81te%CC%81").await.value()["name"],
+        "\u{e9}t\u{e9}"
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_class_that_an_earlier_version_named_is_shown_filled_renamed_and_deleted() {
+    use shapelex::model::ClassName;
+    let app = App::new();
+    for (old, path) in [
+        ("a/b", "a%2Fb"),
+        ("x\u{200b}", "x%E2%80%8B"),
+        ("cafe\u{301}", "cafe%CC%81"),
+    ] {
+        let made = app
+            .state
+            .store
+            .create_class(ClassName::stored(old).unwrap())
+            .unwrap();
+        let shown = app.get(&format!("/v1/classes/{path}")).await.value();
+        assert_eq!(
+            (&shown["name"], &shown["id"]),
+            (&json!(old), &json!(made.id.to_string()))
+        );
+        assert_eq!(
+            app.get(&format!("/v1/classes/{}", made.id)).await.value()["name"],
+            old
+        );
+        let upload = app
+            .post(
+                &format!("/v1/classes/{path}/shapes?create=true"),
+                "model/off",
+                off("bean", 0),
+            )
+            .await;
+        assert_eq!(upload.status, 201, "{}", upload.text());
+        let renamed = app
+            .json("PATCH", &format!("/v1/classes/{path}"), json!({"name": "new"}))
+            .await;
+        assert_eq!(renamed.status, 200, "{}", renamed.text());
+        assert_eq!(app.delete("/v1/classes/new").await.status, 204);
+    }
+    assert_eq!(app.get("/v1/classes").await.value()["items"], json!([]));
+}
+
+#[test]
+fn the_schema_of_names_says_what_the_code_does() {
+    let document: serde_json::Value = serde_json::from_str(
+        &shapelex::http::openapi::document_json()
+            .map_err(|e| e.to_string())
+            .unwrap(),
+    )
+    .unwrap();
+    for request in ["CreateClass", "RenameClass"] {
+        let pattern = &document["components"]["schemas"][request]["properties"]["name"]["pattern"];
+        assert_eq!(pattern, &json!(shapelex::model::ClassName::pattern()));
+    }
+}

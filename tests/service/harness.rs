@@ -94,6 +94,17 @@ impl App {
         self.send(request.body(body.into()).unwrap()).await
     }
 
+    /// A POST of the data directory's owner, who brings the local token.
+    pub async fn post_as_owner(&self, path: &str, media_type: &str, body: impl Into<Body>) -> Answer {
+        let token = self.state.local_token.secret();
+        let request = Request::post(path)
+            .header("authorization", format!("Bearer {token}"))
+            .header("content-type", media_type)
+            .body(body.into())
+            .unwrap();
+        self.send(request).await
+    }
+
     /// Starts a reindex with small parameters and waits for its end.
     pub async fn reindex(&self, body: Value) -> Value {
         let started = self.json("POST", "/v1/reindex", body).await;

@@ -14,9 +14,8 @@ struct Keyed {
 
 impl Keyed {
     async fn new(app: App) -> Self {
-        let made = app
-            .json("POST", "/v1/keys", json!({"name": "root", "scope": "admin"}))
-            .await;
+        let body = json!({"name": "root", "scope": "admin"}).to_string();
+        let made = app.post_as_owner("/v1/keys", "application/json", body).await;
         assert_eq!(made.status, 201, "{}", made.text());
         let admin = made.value()["secret"].as_str().unwrap().to_owned();
         Self { app, admin }
@@ -131,6 +130,101 @@ async fn quotas_count_what_is_there_and_settings_count_where_a_key_is_silent() {
     }
     assert_eq!(upload("d", 1).await.status, 201);
     assert_eq!(make("e").await.status, 201);
+}
+
+/// Counts how many of many requests at the same time were granted.
+async fn granted(requests: impl IntoIterator<Item = Request<Body>>, apps: &[App]) -> usize {
+    let routers = apps.iter().cycle().map(|app| app.router.clone());
+    let sent: Vec<_> = requests
+        .into_iter()
+        .zip(routers)
+        .map(|(request, router)| tokio::spawn(tower::ServiceExt::oneshot(router, request)))
+        .collect();
+    let mut granted = 0;
+    for answer in sent {
+        let status = answer.await.unwrap().unwrap().status();
+        assert!(status == 201 || status == 403, "{status}");
+        granted += usize::from(status == 201);
+    }
+    granted
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 8)]
+async fn a_quota_holds_however_many_ask_at_the_same_time_and_by_whatever_way() {
+    let keyed = Keyed::new(App::new()).await;
+    // Two handles of the same service, each with its own routes.
+    let apps = [App::on(keyed.app.state.clone()), App::on(keyed.app.state.clone())];
+    let request = |secret: &str, path: &str, kind: &str, body: Body| {
+        Request::post(path)
+            .header("x-api-key", secret)
+            .header("content-type", kind)
+            .body(body)
+            .unwrap()
+    };
+    for round in 0..4 {
+        let key = json!({"name": format!("few-{round}"), "scope": "write", "max_classes": 3});
+        let few = keyed.make(key).await;
+        let requests = (0..24).map(|i| match i % 2 {
+            0 => {
+                let body = json!({"name": format!("class {round} {i}")}).to_string();
+                request(&few, "/v1/classes", "application/json", Body::from(body))
+            }
+            _ => {
+                let path = format!("/v1/classes/filled-{round}-{i}/shapes?create=true");
+                request(
+                    &few,
+                    &path,
+                    "model/off",
+                    Body::from(meshes::off(meshes::CLASSES[0], i)),
+                )
+            }
+        });
+        assert_eq!(granted(requests, &apps).await, 3);
+    }
+
+    let length = |pose| meshes::off(meshes::CLASSES[1], pose).len();
+    let limit = (0..24).map(length).max().unwrap() * 3;
+    let key = json!({"name": "bytes", "scope": "write", "max_stored_bytes": limit});
+    let little = keyed.make(key).await;
+    let made = keyed
+        .send(
+            &keyed.admin,
+            "POST",
+            "/v1/classes",
+            "application/json",
+            Body::from("{\"name\":\"shared\"}"),
+        )
+        .await;
+    assert_eq!(made.status, 201);
+    let requests = (0..24).map(|pose| {
+        let path = match pose % 2 {
+            0 => "/v1/classes/shared/shapes".to_owned(),
+            _ => format!("/v1/classes/own-{pose}/shapes?create=true"),
+        };
+        request(
+            &little,
+            &path,
+            "model/off",
+            Body::from(meshes::off(meshes::CLASSES[1], pose)),
+        )
+    });
+    let granted = granted(requests, &apps).await;
+    let id = keyed
+        .app
+        .state
+        .store
+        .api_keys()
+        .unwrap()
+        .iter()
+        .find(|k| k.name.as_str() == "bytes")
+        .unwrap()
+        .id;
+    let usage = keyed.app.state.store.usage(id).unwrap();
+    assert!(usage.bytes <= limit as u64, "{usage:?} of {limit}");
+    assert!(
+        granted >= 3 && usage.shapes == granted as u64,
+        "{granted} {usage:?}"
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]

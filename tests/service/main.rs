@@ -18,4 +18,5 @@ mod recovery_mode;
 mod security;
 mod snapshots;
 mod stored_files;
+mod strangers;
 mod uploads;

@@ -39,7 +39,9 @@ async fn a_snapshot_is_made_listed_downloaded_and_restored_here_and_elsewhere() 
     }
     app.json("POST", "/v1/classes", json!({"name": "later"})).await;
     let job = app.reindex(json!({})).await["id"].clone();
-    let restored = app.post(&format!("/v1/snapshots/{id}/restore"), "", "").await;
+    let restored = app
+        .post_as_owner(&format!("/v1/snapshots/{id}/restore"), "", "")
+        .await;
     assert_eq!(restored.status, 200, "{}", restored.text());
     assert_eq!(
         (&restored.value()["classes"], &restored.value()["shapes"]),
@@ -59,7 +61,7 @@ async fn a_snapshot_is_made_listed_downloaded_and_restored_here_and_elsewhere() 
     // Elsewhere.
     let other = App::new();
     let restored = other
-        .post("/v1/snapshots/restore", "application/zstd", file.body.clone())
+        .post_as_owner("/v1/snapshots/restore", "application/zstd", file.body.clone())
         .await;
     assert_eq!(restored.status, 200, "{}", restored.text());
     assert_eq!(ranked(&other).await, before);
@@ -79,13 +81,15 @@ async fn a_snapshot_is_made_listed_downloaded_and_restored_here_and_elsewhere() 
 #[tokio::test]
 async fn what_is_no_snapshot_is_refused_and_changes_nothing() {
     let app = App::indexed().await;
-    let empty = app.post("/v1/snapshots/restore", "application/zstd", "").await;
+    let empty = app
+        .post_as_owner("/v1/snapshots/restore", "application/zstd", "")
+        .await;
     empty.fails(400, "empty_body");
     let hello = app
-        .post("/v1/snapshots/restore", "application/zstd", "hello")
+        .post_as_owner("/v1/snapshots/restore", "application/zstd", "hello")
         .await;
     hello.fails(422, "invalid_snapshot");
-    app.post("/v1/snapshots/nothing/restore", "", "")
+    app.post_as_owner("/v1/snapshots/nothing/restore", "", "")
         .await
         .fails(404, "snapshot_not_found");
     app.delete("/v1/snapshots/nothing")
@@ -93,7 +97,7 @@ async fn what_is_no_snapshot_is_refused_and_changes_nothing() {
         .fails(404, "snapshot_not_found");
     let small = App::with(|config| config.snapshot_max_bytes = 100);
     let long = small
-        .post("/v1/snapshots/restore", "application/zstd", vec![7; 101])
+        .post_as_owner("/v1/snapshots/restore", "application/zstd", vec![7; 101])
         .await;
     long.fails(413, "body_too_large");
     assert_eq!(app.get("/v1/index").await.value()["generation"], 1);
@@ -113,13 +117,16 @@ async fn a_restore_waits_for_no_job_and_a_job_for_no_restore() {
     let restore = format!("/v1/snapshots/{}/restore", made["id"].as_str().unwrap());
     let slow = json!({"scope": "all", "parameters": {"iterations": 10_000, "atoms": 60}});
     let job = app.json("POST", "/v1/reindex", slow).await.value();
-    let refused = app.post(&restore, "", "").await.fails(409, "jobs_unfinished");
+    let refused = app
+        .post_as_owner(&restore, "", "")
+        .await
+        .fails(409, "jobs_unfinished");
     assert_eq!(refused["jobs"], 1);
     // A snapshot does not wait for the job.
     assert_eq!(app.post("/v1/snapshots", "", "").await.status, 201);
     let id = job["id"].as_str().unwrap();
     app.post(&format!("/v1/jobs/{id}/cancel"), "", "").await;
     app.wait(id).await;
-    let restored = app.post(&restore, "", "").await;
+    let restored = app.post_as_owner(&restore, "", "").await;
     assert_eq!(restored.status, 200, "{}", restored.text());
 }

@@ -6,6 +6,7 @@ mod faults;
 mod formats;
 mod jobs;
 mod power_cut;
+mod quotas;
 mod recovery;
 mod snapshots;
 mod traps;

@@ -10,12 +10,9 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 #[schema(example = json!({"name": "dog"}))]
 pub struct CreateClass {
-    /// 1 to 100 characters, unique; white space around it is dropped, control characters are refused.
-    #[schema(
-        min_length = 1,
-        max_length = 100,
-        pattern = r"^[^\x00-\x1f\x7f-\x9f]*[^\s\x00-\x1f\x7f-\x9f][^\x00-\x1f\x7f-\x9f]*$"
-    )]
+    /// 1 to 100 characters, unique. White space around it is dropped and Unicode normalisation form C is made of it.
+    /// Control, format and other invisible characters, slashes, `.`, `..` and UUIDs are refused.
+    #[schema(min_length = 1, max_length = 100)]
     pub name: String,
 }
 
@@ -24,12 +21,9 @@ pub struct CreateClass {
 #[serde(deny_unknown_fields)]
 #[schema(example = json!({"name": "wolf"}))]
 pub struct RenameClass {
-    /// 1 to 100 characters, unique; white space around it is dropped, control characters are refused.
-    #[schema(
-        min_length = 1,
-        max_length = 100,
-        pattern = r"^[^\x00-\x1f\x7f-\x9f]*[^\s\x00-\x1f\x7f-\x9f][^\x00-\x1f\x7f-\x9f]*$"
-    )]
+    /// 1 to 100 characters, unique. White space around it is dropped and Unicode normalisation form C is made of it.
+    /// Control, format and other invisible characters, slashes, `.`, `..` and UUIDs are refused.
+    #[schema(min_length = 1, max_length = 100)]
     pub name: String,
 }
 

@@ -5,7 +5,6 @@ use crate::http::auth::Caller;
 use crate::http::dto::class::{ClassDto, CreateClass, RenameClass};
 use crate::http::dto::{Page, PageQuery};
 use crate::http::extract::{ApiJson, ApiPath, ApiQuery};
-use crate::http::limits;
 use crate::http::problem::{Code, Problem};
 use crate::model::{Class, ClassId, ClassName};
 use crate::store::{Store, StoreError};
@@ -34,10 +33,8 @@ pub async fn create_class(
     let name = ClassName::new(&body.name)?;
     let class = state
         .blocking(move |s| {
-            s.limits.check_quota(s, &caller, 1, 0)?;
-            let class = s.store.create_class(name)?;
-            limits::note(s, &caller, Some(class.id), &[]);
-            Ok(class)
+            let maker = s.limits.maker(&caller);
+            Ok(s.store.create_class_by(maker.as_ref(), name)?)
         })
         .await?;
     let location = format!("/v1/classes/{}", class.id);
@@ -170,14 +167,23 @@ pub(super) fn find_class(store: &Store, text: &str) -> Result<Class, Problem> {
             found => return Ok(found?),
         }
     }
-    let found = match ClassName::new(text) {
-        Ok(name) => store.class_by_name(&name)?,
-        Err(_) => None,
-    };
-    found.ok_or_else(|| {
+    class_of_name(store, text)?.ok_or_else(|| {
         let shown: String = text.chars().take(100).collect();
         Problem::new(Code::ClassNotFound, format!("there is no class '{shown}'")).with("class", shown)
     })
+}
+
+/// The class called exactly so, which may be a name that no new class gets, or so once the text is put in order.
+fn class_of_name(store: &Store, text: &str) -> Result<Option<Class>, StoreError> {
+    for name in [ClassName::stored(text), ClassName::new(text)]
+        .into_iter()
+        .flatten()
+    {
+        if let Some(class) = store.class_by_name(&name)? {
+            return Ok(Some(class));
+        }
+    }
+    Ok(None)
 }
 
 fn answer(state: &AppState, status: StatusCode, class: Class) -> Response {

@@ -9,6 +9,7 @@ use crate::http::extract::{ApiJson, ApiPath, ApiQuery};
 use crate::http::keyring::new_secret;
 use crate::http::problem::{Code, Problem};
 use crate::http::state::Parts;
+use crate::model::key::SECRET_PREFIX;
 use crate::model::{ApiKey, KeyHash, KeyId, KeyName, Scope};
 use axum::Json;
 use axum::extract::State;
@@ -19,7 +20,8 @@ use jiff::Timestamp;
 /// Make an API key
 ///
 /// The answer has the secret, which is kept nowhere and never shown again. The first key turns keys on: from then on
-/// every request needs one, so the first one has to be of scope `admin`.
+/// every request needs one, so the first one has to be of scope `admin`. While there is none, keys and restoring need
+/// the token that the service keeps in its data directory; `shapelex keys create` sends it by itself.
 #[utoipa::path(
     post, path = "/v1/keys", tag = "keys",
     request_body = CreateKey,
@@ -47,7 +49,7 @@ pub async fn create_key(
                 )
                 .with("name", "scope"));
             }
-            let secret = new_secret().map_err(Problem::internal)?;
+            let secret = new_secret(SECRET_PREFIX).map_err(Problem::internal)?;
             let key = ApiKey {
                 id: KeyId::new(),
                 name,

@@ -8,7 +8,6 @@ use crate::http::dto::class::ClassDto;
 use crate::http::dto::shape::{ShapeDto, UploadQuery, UploadResult};
 use crate::http::dto::{Binary, FilesForm, Page, PageQuery};
 use crate::http::extract::{ApiPath, ApiQuery};
-use crate::http::limits;
 use crate::http::problem::{Code, Problem};
 use crate::http::state::Parts;
 use crate::http::upload;
@@ -66,10 +65,11 @@ pub async fn create_shapes(
     let wanted = class.clone();
     let options = state
         .blocking(move |s| {
-            if create {
-                ClassName::new(&wanted)?;
-            } else {
-                find_class(&s.store, &wanted)?;
+            match find_class(&s.store, &wanted) {
+                Err(problem) if create && problem.code == Code::ClassNotFound => {
+                    ClassName::new(&wanted)?;
+                }
+                found => drop(found?),
             }
             Ok(s.store.parameters()?.prepare_options())
         })
@@ -222,22 +222,18 @@ fn store(
     shapes: Vec<NewShape>,
 ) -> Result<(Class, Vec<AddedShape>), Problem> {
     let _alone = parts.catalogue.lock().unwrap_or_else(PoisonError::into_inner);
-    let bytes = |s: &NewShape| s.bytes.len() + s.companions.iter().map(|c| c.bytes.len()).sum::<usize>();
-    let bytes = shapes.iter().map(bytes).sum::<usize>() as u64;
-    parts.limits.check_quota(parts, caller, 0, bytes)?;
+    let maker = parts.limits.maker(caller);
     let found = match find_class(&parts.store, class) {
         Err(problem) if create && problem.code == Code::ClassNotFound => {
-            parts.limits.check_quota(parts, caller, 1, 0)?;
-            let added = parts.store.create_filled_class(ClassName::new(class)?, shapes)?;
+            let name = ClassName::new(class)?;
+            let added = parts.store.create_filled_class_by(maker.as_ref(), name, shapes)?;
             // A mesh was sent, else the upload had been refused, so there is a shape that names its class.
             let made = added.first().map(|a| a.shape.class).ok_or(problem)?;
-            limits::note(parts, caller, Some(made), &added);
             return Ok((parts.store.class(made)?, added));
         }
         found => found?,
     };
-    let added = parts.store.add_shapes(found.id, shapes)?;
-    limits::note(parts, caller, None, &added);
+    let added = parts.store.add_shapes_by(maker.as_ref(), found.id, shapes)?;
     Ok((parts.store.class(found.id)?, added))
 }
 

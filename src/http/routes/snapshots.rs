@@ -4,7 +4,7 @@ use super::classes::insert;
 use crate::http::AppState;
 use crate::http::dto::snapshot::{RestoredDto, SnapshotDto};
 use crate::http::dto::{Binary, Page, PageQuery};
-use crate::http::extract::{ApiPath, ApiQuery};
+use crate::http::extract::{ApiPath, ApiQuery, media_type};
 use crate::http::problem::{Code, Problem};
 use crate::http::state::Parts;
 use crate::http::upload::body_too_large;
@@ -15,7 +15,7 @@ use crate::store::snapshot::Staged;
 use axum::Json;
 use axum::body::Body;
 use axum::extract::{Request, State};
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use futures_util::StreamExt;
 use std::io::Seek;
@@ -113,9 +113,13 @@ pub async fn get_snapshot_file(
     let (found, path) = state
         .blocking(move |s| Ok((s.store.snapshot(id)?, s.store.snapshot_path(id))))
         .await?;
-    let file = tokio::fs::File::open(path)
-        .await
-        .map_err(|e| Problem::from(StoreError::NoSnapshot { id }).logged(e))?;
+    let file =
+        tokio::fs::File::open(path)
+            .await
+            .map_err(|e| match StoreError::io("read a snapshot", &e) {
+                busy @ StoreError::OutOfDescriptors { .. } => Problem::from(busy),
+                _ => Problem::from(StoreError::NoSnapshot { id }).logged(e),
+            })?;
     let mut response =
         Body::from_stream(tokio_util::io::ReaderStream::with_capacity(file, 256 << 10)).into_response();
     insert(&mut response, header::CONTENT_LENGTH, &found.bytes.to_string());
@@ -162,6 +166,7 @@ pub async fn restore_upload(
     State(state): State<AppState>,
     request: Request,
 ) -> Result<Json<RestoredDto>, Problem> {
+    require_snapshot_type(request.headers())?;
     refuse_busy(&state)?;
     let limit = state.config.snapshot_max_bytes;
     let archive = receive(&state, request, limit).await?;
@@ -169,6 +174,26 @@ pub async fn restore_upload(
         .blocking(move |s| take_over(s, s.store.stage_snapshot(archive, limit)?))
         .await?;
     Ok(Json(restored.into()))
+}
+
+/// A form of a web page can send the types of forms and plain text, and no type; a snapshot comes as none of these.
+fn require_snapshot_type(headers: &HeaderMap) -> Result<(), Problem> {
+    let declared = media_type(headers);
+    let accepted = ["application/zstd", "application/octet-stream"];
+    if declared
+        .as_deref()
+        .is_some_and(|declared| accepted.contains(&declared))
+    {
+        return Ok(());
+    }
+    let found = declared.map_or_else(
+        || "no content type".to_owned(),
+        |declared| format!("'{declared}'"),
+    );
+    Err(Problem::new(
+        Code::UnsupportedMediaType,
+        format!("{found} is not read here; send application/zstd"),
+    ))
 }
 
 /// Switches with nobody else at the catalogue and no job in the way.

@@ -159,7 +159,14 @@ fn next<'a, R: Read>(
 /// Writes a member to the disk and checks its contents.
 fn save(entry: &mut impl Read, path: &Path, member: &Member) -> Result<(), StoreError> {
     let fail = |e: std::io::Error| StoreError::io(format!("write {}", path.display()), &e);
-    let mut file = BufWriter::new(File::create(path).map_err(fail)?);
+    let mut file = BufWriter::new(
+        files::options()
+            .write(true)
+            .create(true)
+            .truncate(true)
+            .open(path)
+            .map_err(fail)?,
+    );
     let mut reader = Hashing::new(entry);
     let mut buffer = vec![0_u8; 128 << 10];
     let mut written = 0_u64;
@@ -182,7 +189,7 @@ fn save(entry: &mut impl Read, path: &Path, member: &Member) -> Result<(), Store
 }
 
 fn make(directory: &Path) -> Result<(), StoreError> {
-    std::fs::create_dir_all(directory)
+    files::create_directory(directory)
         .map_err(|e| StoreError::io(format!("make {}", directory.display()), &e))
 }
 

@@ -2,6 +2,7 @@
 
 use super::super::backend::{Backend, Batch};
 use super::super::event::{files_of, get, put};
+use super::super::files;
 use super::super::open::settle;
 use super::super::payload::Number;
 use super::super::{Store, StoreError, StoreOptions, keys};
@@ -44,7 +45,7 @@ impl Store {
         self.inner.writable()?;
         let directory = self.path().join(UNPACKING);
         remove(&directory)?;
-        std::fs::create_dir_all(&directory)
+        files::create_directory(&directory)
             .map_err(|e| StoreError::io(format!("make {}", directory.display()), &e))?;
         let mut staged = Staged {
             store: self,

@@ -45,7 +45,7 @@ pub(in super::super) fn go_on(data: &Path) -> Result<(), StoreError> {
     let (ready, replaced) = (data.join(READY), data.join(REPLACED));
     if ready.exists() {
         tracing::warn!("switching to the restored state");
-        std::fs::create_dir_all(&replaced)
+        files::create_directory(&replaced)
             .map_err(|e| StoreError::io(format!("make {}", replaced.display()), &e))?;
         for part in PARTS {
             let (new, place) = (ready.join(part), data.join(part));

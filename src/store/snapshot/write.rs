@@ -38,7 +38,7 @@ impl Store {
         let _alone = self.one_at_a_time()?;
         self.inner.writable()?;
         let directory = self.snapshot_directory();
-        std::fs::create_dir_all(&directory)
+        files::create_directory(&directory)
             .map_err(|e| StoreError::io(format!("make {}", directory.display()), &e))?;
         files::sync_directory(self.path())?;
         let _files_stay = self.pin();
