@@ -3,14 +3,15 @@
 //! Local commands call the very routes a client calls, without a socket in between, so there is one implementation of
 //! uploading, indexing and querying.
 
-use super::CliError;
+use super::wording::{self, Place};
+use super::{CliError, data_dir, trust};
 use crate::config::{Config, DEFAULT_LISTEN};
-use crate::http::{AppState, router};
+use crate::http::{AppState, OpenError, router};
 use axum::Router;
 use axum::body::Body;
 use axum::http::Request;
 use serde_json::Value;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tower::ServiceExt;
 
@@ -24,25 +25,46 @@ const CLOSE_WITHIN: Duration = Duration::from_secs(30);
 pub struct TargetArgs {
     /// Data directory to work in, when no service runs on it [default: shapelex-data]
     #[arg(long, env = "SHAPELEX_DATA", value_name = "DIR", conflicts_with = "server")]
-    pub data: Option<std::path::PathBuf>,
-    /// Running service to work with, such as http://127.0.0.1:7345
+    pub data: Option<PathBuf>,
+    /// Running service to work with, such as http://127.0.0.1:7345 or https://shapes.example
     #[arg(long, env = "SHAPELEX_SERVER", value_name = "URL")]
     pub server: Option<String>,
     /// API key for a running service that asks for one; the environment keeps it out of the process list
     #[arg(long, env = "SHAPELEX_API_KEY", value_name = "KEY", hide_env_values = true)]
     pub api_key: Option<String>,
+    /// Certificates (PEM) to trust a https:// service by, instead of the well-known ones
+    #[arg(long, env = "SHAPELEX_CA_CERT", value_name = "FILE")]
+    pub ca_cert: Option<PathBuf>,
 }
 
 impl TargetArgs {
-    /// Connects, or opens the data directory.
+    /// Connects, or opens the data directory, which has to be there.
+    ///
+    /// # Errors
+    /// As [`Client::remote`], [`Client::local`] and [`data_dir::require`].
+    pub fn client(&self) -> Result<Client, CliError> {
+        if self.server.is_none() {
+            data_dir::require(&data_dir::chosen(self.data.as_deref()))?;
+        }
+        self.client_or_new()
+    }
+
+    /// The same; a data directory that is not there is made, and said to be.
     ///
     /// # Errors
     /// As [`Client::remote`] and [`Client::local`].
-    pub fn client(&self) -> Result<Client, CliError> {
-        match &self.server {
-            Some(url) => Ok(Client::remote(url)?.with_key(self.api_key.clone())),
-            None => Client::local(self.data.as_deref()),
+    pub fn client_or_new(&self) -> Result<Client, CliError> {
+        if let Some(url) = &self.server {
+            return Ok(Client::remote(url, self.ca_cert.as_deref())?.with_key(self.api_key.clone()));
         }
+        let data = data_dir::chosen(self.data.as_deref());
+        data_dir::require_place(&data)?;
+        let is_new = !data_dir::exists(&data);
+        let client = Client::local(&data)?;
+        if is_new {
+            data_dir::say_made(&data);
+        }
+        Ok(client)
     }
 }
 
@@ -72,6 +94,20 @@ pub enum CallError {
     Unreachable(String),
 }
 
+impl CallError {
+    /// The same, the service's words translated.
+    #[must_use]
+    pub(super) fn worded(self, place: &Place) -> Self {
+        match self {
+            Self::Refused { code, detail } => Self::Refused {
+                detail: wording::detail(place, &code, &detail),
+                code,
+            },
+            other => other,
+        }
+    }
+}
+
 impl From<CallError> for CliError {
     fn from(error: CallError) -> Self {
         match error {
@@ -94,24 +130,29 @@ pub(super) enum Transport {
         runtime: tokio::runtime::Runtime,
         router: Router,
         state: AppState,
+        data: PathBuf,
     },
 }
 
 impl Client {
-    /// A running service. Nothing is sent yet.
+    /// A running service, trusted by the certificates in a file, or by the well-known ones. Nothing is sent yet.
     ///
     /// # Errors
-    /// [`CliError::Usage`] where the address is not `http://…`.
-    pub fn remote(url: &str) -> Result<Self, CliError> {
+    /// [`CliError::Usage`] where the address is neither `http://…` nor `https://…`, or the file is not usable.
+    pub fn remote(url: &str, ca_cert: Option<&Path>) -> Result<Self, CliError> {
         let base = url.trim_end_matches('/').to_owned();
-        if !base.starts_with("http://") {
+        if !["http://", "https://"].iter().any(|scheme| {
+            base.strip_prefix(scheme)
+                .is_some_and(|host| !host.is_empty() && host.parse::<ureq::http::uri::Authority>().is_ok())
+        }) {
             return Err(CliError::Usage(format!(
-                "--server {url}: expected an address such as http://{DEFAULT_LISTEN}"
+                "--server {url}: expected an address such as http://{DEFAULT_LISTEN} or https://shapes.example"
             )));
         }
         let agent = ureq::Agent::config_builder()
             .http_status_as_error(false)
             .timeout_connect(Some(Duration::from_secs(10)))
+            .tls_config(trust::config(ca_cert)?)
             .build()
             .new_agent();
         Ok(Self(Transport::Remote {
@@ -119,6 +160,14 @@ impl Client {
             base,
             key: None,
         }))
+    }
+
+    /// Where it works.
+    pub(super) fn place(&self) -> Place {
+        match &self.0 {
+            Transport::Remote { base, .. } => Place::Server(base.clone()),
+            Transport::Local { data, .. } => Place::Data(data.clone()),
+        }
     }
 
     /// The same with an API key.
@@ -134,11 +183,11 @@ impl Client {
     ///
     /// # Errors
     /// [`CliError::Failed`] where the directory cannot be opened.
-    pub fn local(data: Option<&Path>) -> Result<Self, CliError> {
-        let mut config = Config::default();
-        if let Some(data) = data {
-            config.data = data.to_owned();
-        }
+    pub fn local(data: &Path) -> Result<Self, CliError> {
+        let config = Config {
+            data: data.to_owned(),
+            ..Config::default()
+        };
         // One person waits for one answer: every core learns, and no query is cut short.
         let mut service = config.service();
         service.indexing_threads = service.query_threads;
@@ -152,13 +201,17 @@ impl Client {
             .build()?;
         let state = {
             let _inside = runtime.enter();
-            AppState::open(service).map_err(|error| CliError::Failed(error.to_string()))?
+            AppState::open(service).map_err(|error| match &error {
+                OpenError::Store(store) => data_dir::open_error(store),
+                other => CliError::Failed(other.to_string()),
+            })?
         };
         let router = router(state.clone());
         Ok(Self(Transport::Local {
             runtime,
             router,
             state,
+            data: data.to_owned(),
         }))
     }
 
@@ -176,7 +229,7 @@ impl Client {
             Payload::Bytes(content_type, bytes) => (Some(content_type), bytes),
         };
         let (status, bytes) = self.send(method, path, content_type, body)?;
-        outcome(status, &bytes)
+        outcome(status, &bytes).map_err(|error| error.worded(&self.place()))
     }
 
     fn send(

@@ -5,11 +5,12 @@ use super::demo_report::{Answer, Summary};
 use super::files::MeshFile;
 use super::progress::Progress;
 use super::zoo::{Specimen, ZooFormat, specimens, write};
-use super::{CliError, ParameterArgs, api, output, service};
+use super::{CliError, ParameterArgs, api, data_dir, output, service};
 use crate::config::Config;
 use crate::http::ServiceConfig;
 use crate::sample::ZooOptions;
 use rayon::prelude::*;
+use serde_json::json;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
@@ -82,10 +83,14 @@ pub fn run(args: &DemoArgs, json: bool) -> Result<(), CliError> {
         (None, Some(temporary)) => temporary.path().to_owned(),
         (None, None) => return Err(CliError::Failed("no data directory".to_owned())),
     };
+    data_dir::require_place(&data)?;
+    if args.data.is_some() && !data_dir::exists(&data) {
+        data_dir::say_made(&data);
+    }
     let service = Running::start(config(&data, args.listen))?;
     let url = service.url();
     eprintln!("service on {url}");
-    let client = Client::remote(&url)?;
+    let client = Client::remote(&url, None)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(CONNECTIONS)
         .build()
@@ -95,7 +100,7 @@ pub fn run(args: &DemoArgs, json: bool) -> Result<(), CliError> {
     pool.install(|| upload(&client, &known))?;
     let uploaded = at.elapsed().as_secs_f64();
     let at = Instant::now();
-    api::reindex(&client, &args.parameters)?;
+    api::reindex(&client, &args.parameters, json!("stale"))?;
     let reindexed = at.elapsed().as_secs_f64();
     let at = Instant::now();
     let answers = pool.install(|| query(&client, &unseen))?;

@@ -1,6 +1,6 @@
 //! What the demo found out.
 
-use super::{output, query};
+use super::{output, query_text};
 use serde::Serialize;
 use serde_json::Value;
 use std::path::Path;
@@ -130,7 +130,7 @@ impl Summary {
             if let Some(classes) = value["classes"].as_array_mut() {
                 classes.truncate(EXAMPLE_CLASSES);
             }
-            text += &query::text(Path::new(&answer.name), &value);
+            text += &query_text::text(Path::new(&answer.name), &value);
             text += "\n\n";
         }
         if self.mistakes.is_empty() {

@@ -1,14 +1,17 @@
 //! `shapelex evaluate`: how often the method is right on a folder per class.
 
-use super::files::{LabelledFile, MeshFile, labelled_files};
+use super::evaluate_checks::{check, keep_classes};
+use super::evaluate_figures::Figures;
+use super::files::MeshFile;
+use super::folders::{LabelledFile, labelled_files};
 use super::progress::Progress;
 use super::refused::Refused;
-use super::{CliError, ParameterArgs, evaluation_report, figures, output};
+use super::values::at_least_one;
+use super::{CliError, ParameterArgs, evaluation_report, output};
 use crate::benchmark::evaluate::Models;
 use crate::benchmark::retrieval::{RetrievalOutcome, coding_scores, judge_retrieval};
 use crate::benchmark::{Evaluation, LabelledShape, OpenSet, Protocol, evaluate, evaluate_open_set};
 use crate::cancel::Cancel;
-use crate::figure::evaluation_figures;
 use crate::mesh::{Limits, MeshError, TriangleSoup, read, read_poses};
 use crate::parameters::Parameters;
 use crate::pipeline::describe_both;
@@ -39,7 +42,7 @@ pub enum ProtocolName {
 /// Arguments of `evaluate`.
 #[derive(Debug, clap::Args)]
 pub struct EvaluateArgs {
-    /// Folder with a folder per class
+    /// Folder with a folder per class, which may have subfolders
     #[arg(value_name = "DIR")]
     pub dir: PathBuf,
     /// How shapes are split into training shapes and queries; may be repeated
@@ -51,13 +54,13 @@ pub struct EvaluateArgs {
     #[arg(long, value_name = "CLASS,CLASS…")]
     pub same: Vec<String>,
     /// Leave out classes with fewer shapes
-    #[arg(long, value_name = "COUNT", default_value_t = 2)]
+    #[arg(long, value_name = "COUNT", default_value_t = 2, value_parser = at_least_one)]
     pub min_shapes: usize,
     /// Sample this many poses of every animated glTF; other files count once
-    #[arg(long, value_name = "COUNT")]
+    #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
     pub poses: Option<usize>,
     /// Independent draws of one-shot and open-set
-    #[arg(long, value_name = "COUNT", default_value_t = 5)]
+    #[arg(long, value_name = "COUNT", default_value_t = 5, value_parser = at_least_one)]
     pub draws: usize,
     /// Folds of k-fold
     #[arg(long, value_name = "COUNT", default_value_t = 6)]
@@ -68,7 +71,8 @@ pub struct EvaluateArgs {
     /// How many of the worst queries are listed
     #[arg(long, value_name = "COUNT", default_value_t = 10)]
     pub worst: usize,
-    /// Draw confusion, dissimilarity and embedding of the classes into this folder, an SVG file each
+    /// Draw confusion, accuracy, dissimilarity and embedding of the classes, the worst queries, precision over recall
+    /// and coverage over level into this folder, an SVG file each
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,
     /// The method's parameters.
@@ -111,33 +115,20 @@ pub struct Outcome {
     pub evaluation: Evaluation,
 }
 
-/// Describes every file once, then runs the protocols.
+/// Describes every file once, then runs the protocols. What can be known before is checked before.
 ///
 /// # Errors
-/// [`CliError::Usage`] where fewer than two classes are left; [`CliError::Reported`] where a file was refused, after
-/// the evaluation of the others.
+/// [`CliError::Usage`] where the arguments and the folder do not fit, before anything is described;
+/// [`CliError::Failed`] where too many files were refused; [`CliError::Reported`] where a file was refused, after the
+/// evaluation of the others.
 pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
     let began = Instant::now();
     let parameters = args.parameters.parameters()?;
-    let same: Vec<Vec<String>> = args
-        .same
-        .iter()
-        .map(|group| group.split(',').map(|c| c.trim().to_owned()).collect())
-        .collect();
     let files = labelled_files(&args.dir)?;
+    let same = check(args, &files, &parameters)?;
+    let figures = Figures::new(args.figures.as_deref(), args.poses, &files)?;
     let (mut shapes, refused) = describe(&files, args.poses, &parameters);
     let (classes, left_out) = keep_classes(&mut shapes, args.min_shapes);
-    for group in &same {
-        if let Some(unknown) = group
-            .iter()
-            .find(|&c| !classes.contains_key(c) && !left_out.contains(c))
-        {
-            return Err(CliError::Usage(format!(
-                "--same: there is no class '{unknown}' in {}",
-                args.dir.display()
-            )));
-        }
-    }
     if classes.len() < 2 {
         return Err(CliError::Failed(format!(
             "{}: {} classes with at least {} usable shapes; an evaluation needs two",
@@ -146,48 +137,21 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
             args.min_shapes
         )));
     }
-    let mut protocols = Vec::new();
-    let mut retrieval = None;
-    let mut open = None;
-    for &name in &args.protocol {
-        let Some(protocol) = protocol(name, args) else {
-            match name {
-                ProtocolName::OpenSet => open = open_set(&shapes, &parameters, &same, args)?,
-                _ => retrieval = Some(retrieve(&shapes, &parameters, &same)?),
-            }
-            continue;
-        };
-        let progress = Progress::new(protocol.name(), 0);
-        let mut evaluation = evaluate(
-            &shapes,
-            protocol,
-            &parameters,
-            &same,
-            &Cancel::new(),
-            &|done, total| progress.set(done, total),
-        )?;
-        progress.finish();
-        if let Some(dir) = &args.figures {
-            figures::write(dir, &evaluation_figures(&evaluation)?)?;
-        }
-        evaluation.queries.truncate(args.worst);
-        protocols.push(Outcome {
-            name: protocol.name(),
-            top1: evaluation.top1(),
-            evaluation,
-        });
-    }
-    let report = Report {
+    let mut report = Report {
         classes,
         shapes: shapes.len(),
         refused,
         left_out,
         parameters,
-        protocols,
-        retrieval,
-        open_set: open,
-        seconds: began.elapsed().as_secs_f64(),
+        protocols: Vec::new(),
+        retrieval: None,
+        open_set: None,
+        seconds: 0.0,
     };
+    for &name in &args.protocol {
+        run_protocol(name, args, (&shapes, &same), &figures, &mut report)?;
+    }
+    report.seconds = began.elapsed().as_secs_f64();
     if json {
         output::json(&report)?;
     } else {
@@ -198,6 +162,48 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
     } else {
         Err(CliError::Reported)
     }
+}
+
+/// Runs one protocol, draws its figures and adds what came of it to the report.
+fn run_protocol(
+    name: ProtocolName,
+    args: &EvaluateArgs,
+    (shapes, same): (&[LabelledShape], &[Vec<String>]),
+    figures: &Figures<'_>,
+    report: &mut Report,
+) -> Result<(), CliError> {
+    let Some(protocol) = protocol(name, args) else {
+        match name {
+            ProtocolName::OpenSet => {
+                report.open_set = open_set(shapes, &report.parameters, same, args)?;
+                figures.open_set(report.open_set.as_ref())?;
+            }
+            _ => {
+                let outcome = retrieve(shapes, &report.parameters, same)?;
+                figures.retrieval(&outcome)?;
+                report.retrieval = Some(outcome);
+            }
+        }
+        return Ok(());
+    };
+    let progress = Progress::new(protocol.name(), 0);
+    let mut evaluation = evaluate(
+        shapes,
+        protocol,
+        &report.parameters,
+        same,
+        &Cancel::new(),
+        &|done, total| progress.set(done, total),
+    )?;
+    progress.finish();
+    figures.evaluation(&evaluation)?;
+    evaluation.queries.truncate(args.worst);
+    report.protocols.push(Outcome {
+        name: protocol.name(),
+        top1: evaluation.top1(),
+        evaluation,
+    });
+    Ok(())
 }
 
 /// The split of a protocol; none for those that are not about one right class per query.
@@ -291,22 +297,7 @@ fn describe_file(
     poses: Option<usize>,
     parameters: &Parameters,
 ) -> Result<Vec<LabelledShape>, CliError> {
-    let limits = Limits::default();
-    let mesh = MeshFile::load(&file.path, limits.max_bytes)?;
-    let one = |mesh: &MeshFile| -> Result<Vec<(String, TriangleSoup)>, MeshError> {
-        Ok(vec![(mesh.name.clone(), read(&mesh.source(), &limits)?.1)])
-    };
-    let soups = match poses {
-        None => one(&mesh)?,
-        Some(count) => match read_poses(&mesh.source(), count, &limits) {
-            Ok((_, poses)) => poses
-                .into_iter()
-                .map(|pose| (format!("{} {}", mesh.name, pose.label), pose.soup))
-                .collect(),
-            Err(MeshError::NoAnimation) => one(&mesh)?,
-            Err(error) => return Err(error.into()),
-        },
-    };
+    let soups = poses_of(file, poses)?;
     soups
         .into_iter()
         .map(|(name, soup)| {
@@ -321,18 +312,25 @@ fn describe_file(
         .collect()
 }
 
-/// Drops shapes of classes with too few; returns the others' counts and the names of the dropped.
-fn keep_classes(shapes: &mut Vec<LabelledShape>, least: usize) -> (BTreeMap<String, usize>, Vec<String>) {
-    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-    for shape in shapes.iter() {
-        *counts.entry(shape.class.clone()).or_default() += 1;
+/// The surfaces of a file with their names: one, or those of its poses where it is animated and some were asked for.
+pub(super) fn poses_of(
+    file: &LabelledFile,
+    poses: Option<usize>,
+) -> Result<Vec<(String, TriangleSoup)>, CliError> {
+    let limits = Limits::default();
+    let mesh = MeshFile::load(&file.path, limits.max_bytes)?;
+    let one = || -> Result<Vec<(String, TriangleSoup)>, MeshError> {
+        Ok(vec![(file.name.clone(), read(&mesh.source(), &limits)?.1)])
+    };
+    let Some(count) = poses else {
+        return Ok(one()?);
+    };
+    match read_poses(&mesh.source(), count, &limits) {
+        Ok((_, poses)) => Ok(poses
+            .into_iter()
+            .map(|pose| (format!("{} {}", file.name, pose.label), pose.soup))
+            .collect()),
+        Err(MeshError::NoAnimation) => Ok(one()?),
+        Err(error) => Err(error.into()),
     }
-    let left_out = counts
-        .iter()
-        .filter(|&(_, &n)| n < least)
-        .map(|(class, _)| class.clone())
-        .collect();
-    counts.retain(|_, n| *n >= least);
-    shapes.retain(|shape| counts.contains_key(&shape.class));
-    (counts, left_out)
 }

@@ -35,3 +35,4 @@ pub use config::ServiceConfig;
 pub use router::router;
 pub use serve::serve;
 pub use state::{AppState, OpenError};
+pub use tls::check_tls;

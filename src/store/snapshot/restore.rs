@@ -100,7 +100,7 @@ impl Staged<'_> {
             .and_then(|()| settle(data, &*inner.backend, &mut notes));
         *writer = switched.map_err(|e| inner.fail(e))?;
         for line in notes {
-            tracing::warn!(line, "restored");
+            tracing::info!(line, "restored");
         }
         Ok(self.restored.clone())
     }

@@ -34,7 +34,7 @@ pub(in super::super) fn finish_restore(data: &Path) -> Result<(), StoreError> {
 pub(in super::super) fn go_on(data: &Path) -> Result<(), StoreError> {
     let (ready, replaced) = (data.join(READY), data.join(REPLACED));
     if ready.exists() {
-        tracing::warn!("switching to the restored state");
+        tracing::info!("switching to the restored state");
         std::fs::create_dir_all(&replaced).map_err(|e| StoreError::io("put the old state aside", &e))?;
         for part in PARTS {
             let (new, place) = (ready.join(part), data.join(part));
