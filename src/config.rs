@@ -410,7 +410,10 @@ mod tests {
         assert!(error.contains("listen"), "names what there is: {error}");
         let kind = file("job_queue = \"many\"\n");
         let error = Settings::from_file(kind.path()).unwrap_err().to_string();
-        assert!(error.contains("line 1: job_queue: ") && !error.contains('\n'), "{error}");
+        assert!(
+            error.contains("line 1: job_queue: ") && !error.contains('\n'),
+            "{error}"
+        );
         assert!(Settings::from_file(Path::new("/nowhere/shapelex.toml")).is_err());
     }
 
@@ -425,6 +428,9 @@ mod tests {
         let file = file("job_queue = 7\n\nmax_vertices = 0\n");
         let error = Settings::from_file(file.path()).unwrap().resolve().unwrap_err();
         let said = error.in_file(file.path()).to_string();
-        assert!(said.contains("line 3: max_vertices must be 1 or more, got 0"), "{said}");
+        assert!(
+            said.contains("line 3: max_vertices must be 1 or more, got 0"),
+            "{said}"
+        );
     }
 }

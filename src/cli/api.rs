@@ -2,6 +2,7 @@
 
 use super::CliError;
 use super::client::{CallError, Client, Payload};
+use super::encode::encode;
 use super::files::MeshFile;
 use super::follow::{follow, succeeded};
 use super::parameters::ParameterArgs;
@@ -110,28 +111,10 @@ fn mesh_payload(file: MeshFile) -> Payload {
     Payload::Bytes(format!("multipart/form-data; boundary={boundary}"), body)
 }
 
-/// Percent-encodes everything but RFC 3986's unreserved characters.
-pub fn encode(text: &str) -> String {
-    text.bytes().fold(String::new(), |mut encoded, byte| {
-        if byte.is_ascii_alphanumeric() || b"-._~".contains(&byte) {
-            encoded.push(char::from(byte));
-        } else {
-            // Writing to a String cannot fail.
-            let _ = write!(encoded, "%{byte:02X}");
-        }
-        encoded
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::mesh::Companion;
-
-    #[test]
-    fn names_are_encoded_for_a_path() {
-        assert_eq!(encode("great dane/ä?.obj"), "great%20dane%2F%C3%A4%3F.obj");
-    }
 
     #[test]
     fn buffers_travel_beside_their_file() {

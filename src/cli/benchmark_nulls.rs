@@ -52,7 +52,10 @@ pub fn of_files(paths: &[PathBuf], vertices: usize) -> Result<Vec<Null>, CliErro
     let mut classes: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
     for path in paths {
         if !path.exists() {
-            return Err(CliError::Usage(format!("{}: there is no such file or folder", path.display())));
+            return Err(CliError::Usage(format!(
+                "{}: there is no such file or folder",
+                path.display()
+            )));
         }
         let mut found: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
         if path.is_dir() {

@@ -1,10 +1,10 @@
 //! `shapelex classes`: the classes of an index.
 
-use super::api::encode;
+use super::CliError;
 use super::client::{Payload, TargetArgs};
 use super::confirm::ConfirmArgs;
+use super::encode::encode;
 use super::listing::{self, Column};
-use super::CliError;
 use serde_json::json;
 
 const COLUMNS: [Column; 5] = [

@@ -97,7 +97,11 @@ pub fn near_name(path: &Path, fits: impl Fn(&Path) -> bool) -> Option<PathBuf> {
         _ => PathBuf::from("."),
     };
     let likeness = |other: &Path| {
-        let name = other.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = other
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
         strsim::jaro_winkler(&wanted, &name)
     };
     std::fs::read_dir(&folder)
@@ -125,12 +129,17 @@ mod tests {
         assert!(require(&used).is_ok());
         let typo = dir.path().join("shapelex-dta");
         let said = require(&typo).unwrap_err().to_string();
-        assert!(said.contains(&format!("did you mean {}?", used.display())), "{said}");
+        assert!(
+            said.contains(&format!("did you mean {}?", used.display())),
+            "{said}"
+        );
         assert!(said.contains("--server"), "{said}");
         assert!(!typo.exists());
         let far = require(&dir.path().join("elsewhere")).unwrap_err().to_string();
         assert!(!far.contains("did you mean"), "{far}");
-        let empty = require(&dir.path().join("shapelex-date")).unwrap_err().to_string();
+        let empty = require(&dir.path().join("shapelex-date"))
+            .unwrap_err()
+            .to_string();
         assert!(empty.contains("no data directory of shapelex"), "{empty}");
     }
 }

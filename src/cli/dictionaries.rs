@@ -85,7 +85,11 @@ pub fn to_bytes(exported: &Exported) -> Result<Vec<u8>, CliError> {
 /// [`CliError::Usage`] where there is no such file; [`CliError::Failed`] with the path and what is wrong.
 pub fn load(path: &Path) -> Result<Exported, CliError> {
     if !path.is_file() {
-        let what = if path.is_dir() { "this is a folder" } else { "there is no such file" };
+        let what = if path.is_dir() {
+            "this is a folder"
+        } else {
+            "there is no such file"
+        };
         return Err(CliError::Usage(format!(
             "{}: {what}; expected a file written by `shapelex export`",
             path.display()

@@ -1,84 +1,21 @@
 //! `shapelex evaluate`: how often the method is right on a folder per class.
 
-use super::evaluate_checks::{check, keep_classes};
+use super::evaluate_args::{EvaluateArgs, ProtocolName};
+use super::evaluate_checks::check;
+use super::evaluate_describe::{describe, keep_classes};
 use super::evaluate_figures::Figures;
-use super::files::MeshFile;
-use super::folders::{LabelledFile, labelled_files};
+use super::folders::labelled_files;
 use super::progress::Progress;
 use super::refused::Refused;
-use super::values::at_least_one;
-use super::{CliError, ParameterArgs, evaluation_report, output};
+use super::{CliError, evaluation_report, output};
 use crate::benchmark::evaluate::Models;
 use crate::benchmark::retrieval::{RetrievalOutcome, coding_scores, judge_retrieval};
 use crate::benchmark::{Evaluation, LabelledShape, OpenSet, Protocol, evaluate, evaluate_open_set};
 use crate::cancel::Cancel;
-use crate::mesh::{Limits, MeshError, TriangleSoup, read, read_poses};
 use crate::parameters::Parameters;
-use crate::pipeline::describe_both;
-use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::time::Instant;
-
-/// A protocol by name; the numbers come from other flags.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum ProtocolName {
-    /// Every shape is queried once, all others train
-    LeaveOneOut,
-    /// In order of the names the 1st, 3rd, 5th … shape of a class trains, the others are queried
-    EvenOdd,
-    /// One shape per class trains, drawn at random, all others are queried
-    OneShot,
-    /// Every class is dealt into folds, each is queried once
-    KFold,
-    /// Shape against shape: every shape asks for the others of its class
-    Retrieval,
-    /// How often a shape of a class that is not indexed is answered "none of these", and what the possible classes
-    /// promise: half of every class trains, drawn at random
-    OpenSet,
-}
-
-/// Arguments of `evaluate`.
-#[derive(Debug, clap::Args)]
-pub struct EvaluateArgs {
-    /// Folder with a folder per class, which may have subfolders
-    #[arg(value_name = "DIR")]
-    pub dir: PathBuf,
-    /// How shapes are split into training shapes and queries; may be repeated
-    #[arg(long, value_enum, value_name = "PROTOCOL",
-          default_values_t = [ProtocolName::LeaveOneOut, ProtocolName::EvenOdd, ProtocolName::OneShot,
-                              ProtocolName::Retrieval])]
-    pub protocol: Vec<ProtocolName>,
-    /// Classes that count as one another's right answer, such as --same michael,david; may be repeated
-    #[arg(long, value_name = "CLASS,CLASS…")]
-    pub same: Vec<String>,
-    /// Leave out classes with fewer shapes
-    #[arg(long, value_name = "COUNT", default_value_t = 2, value_parser = at_least_one)]
-    pub min_shapes: usize,
-    /// Sample this many poses of every animated glTF; other files count once
-    #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
-    pub poses: Option<usize>,
-    /// Independent draws of one-shot and open-set
-    #[arg(long, value_name = "COUNT", default_value_t = 5, value_parser = at_least_one)]
-    pub draws: usize,
-    /// Folds of k-fold
-    #[arg(long, value_name = "COUNT", default_value_t = 6)]
-    pub folds: usize,
-    /// Seed of the draws and folds
-    #[arg(long, value_name = "SEED", default_value_t = 1)]
-    pub split_seed: u64,
-    /// How many of the worst queries are listed
-    #[arg(long, value_name = "COUNT", default_value_t = 10)]
-    pub worst: usize,
-    /// Draw confusion, accuracy, dissimilarity and embedding of the classes, the worst queries, precision over recall
-    /// and coverage over level into this folder, an SVG file each
-    #[arg(long, value_name = "DIR")]
-    pub figures: Option<PathBuf>,
-    /// The method's parameters.
-    #[command(flatten)]
-    pub parameters: ParameterArgs,
-}
 
 /// Everything an evaluation found out.
 #[derive(Debug, Serialize)]
@@ -263,74 +200,4 @@ fn open_set(
         }
     }
     Ok(sum)
-}
-
-/// Describes every file on all cores. Files that cannot be used come back with their reason.
-fn describe(
-    files: &[LabelledFile],
-    poses: Option<usize>,
-    parameters: &Parameters,
-) -> (Vec<LabelledShape>, Vec<Refused>) {
-    let progress = Progress::new("describe", files.len());
-    let results: Vec<Result<Vec<LabelledShape>, Refused>> = files
-        .par_iter()
-        .map(|file| {
-            let result = describe_file(file, poses, parameters);
-            progress.tick();
-            result.map_err(|error| Refused::new(&file.path, error))
-        })
-        .collect();
-    progress.finish();
-    let mut shapes = Vec::new();
-    let mut refused = Vec::new();
-    for result in results {
-        match result {
-            Ok(described) => shapes.extend(described),
-            Err(refusal) => refused.push(refusal),
-        }
-    }
-    (shapes, refused)
-}
-
-fn describe_file(
-    file: &LabelledFile,
-    poses: Option<usize>,
-    parameters: &Parameters,
-) -> Result<Vec<LabelledShape>, CliError> {
-    let soups = poses_of(file, poses)?;
-    soups
-        .into_iter()
-        .map(|(name, soup)| {
-            let (training, query) = describe_both(soup, parameters, &Cancel::new())?;
-            Ok(LabelledShape {
-                class: file.class.clone(),
-                name,
-                training,
-                query,
-            })
-        })
-        .collect()
-}
-
-/// The surfaces of a file with their names: one, or those of its poses where it is animated and some were asked for.
-pub(super) fn poses_of(
-    file: &LabelledFile,
-    poses: Option<usize>,
-) -> Result<Vec<(String, TriangleSoup)>, CliError> {
-    let limits = Limits::default();
-    let mesh = MeshFile::load(&file.path, limits.max_bytes)?;
-    let one = || -> Result<Vec<(String, TriangleSoup)>, MeshError> {
-        Ok(vec![(file.name.clone(), read(&mesh.source(), &limits)?.1)])
-    };
-    let Some(count) = poses else {
-        return Ok(one()?);
-    };
-    match read_poses(&mesh.source(), count, &limits) {
-        Ok((_, poses)) => Ok(poses
-            .into_iter()
-            .map(|pose| (format!("{} {}", file.name, pose.label), pose.soup))
-            .collect()),
-        Err(MeshError::NoAnimation) => Ok(one()?),
-        Err(error) => Err(error.into()),
-    }
 }

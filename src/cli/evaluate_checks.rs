@@ -1,9 +1,8 @@
 //! What is wrong with an evaluation before anything is described.
 
 use super::CliError;
-use super::evaluate::{EvaluateArgs, ProtocolName};
+use super::evaluate_args::{EvaluateArgs, ProtocolName};
 use super::folders::LabelledFile;
-use crate::benchmark::LabelledShape;
 use crate::parameters::{Parameters, RankBy};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -32,7 +31,9 @@ pub fn check(
     let same = groups(&args.same, &args.dir, &counts)?;
     let kept = || counts.values().copied().filter(|&n| n >= args.min_shapes);
     if kept().count() < 2 {
-        let flat = files.iter().all(|file| file.path.parent() == Some(args.dir.as_path()));
+        let flat = files
+            .iter()
+            .all(|file| file.path.parent() == Some(args.dir.as_path()));
         let why = if flat {
             format!(
                 "the {} files lie in the folder itself, which makes each a class of its own; expected a folder per class",
@@ -49,14 +50,19 @@ pub fn check(
         return wrong(format!("{dir}: {why}"));
     }
     if kept().all(|n| n < 2) {
-        return wrong(format!("{dir}: no class has two shapes, so that none could be queried"));
+        return wrong(format!(
+            "{dir}: no class has two shapes, so that none could be queried"
+        ));
     }
     if args.protocol.contains(&ProtocolName::KFold) && args.folds < 2 {
         return wrong("--folds must be 2 or more: one fold trains, another is queried".to_owned());
     }
     if args.protocol.contains(&ProtocolName::OpenSet) {
         if parameters.rank_by == RankBy::Frobenius {
-            return wrong("--protocol open-set: answers ranked by frobenius are not judged; use another rank_by".to_owned());
+            return wrong(
+                "--protocol open-set: answers ranked by frobenius are not judged; use another rank_by"
+                    .to_owned(),
+            );
         }
         let training: usize = kept().filter(|&n| n >= SPLIT).map(|n| n.div_ceil(2)).sum();
         if training < HELD_OUT {
@@ -71,18 +77,19 @@ pub fn check(
 
 /// As many shapes as a file can give.
 fn most_poses(file: &LabelledFile, poses: Option<usize>) -> usize {
-    let extension = file.path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let extension = file
+        .path
+        .extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase();
     match poses {
         Some(count) if extension == "gltf" || extension == "glb" => count,
         _ => 1,
     }
 }
 
-fn groups(
-    same: &[String],
-    dir: &Path,
-    counts: &BTreeMap<&str, usize>,
-) -> Result<Vec<Vec<String>>, CliError> {
+fn groups(same: &[String], dir: &Path, counts: &BTreeMap<&str, usize>) -> Result<Vec<Vec<String>>, CliError> {
     same.iter()
         .map(|given| {
             let group: Vec<String> = given.split(',').map(|class| class.trim().to_owned()).collect();
@@ -101,20 +108,4 @@ fn groups(
             }
         })
         .collect()
-}
-
-/// Drops shapes of classes with too few; returns the others' counts and the names of the dropped.
-pub fn keep_classes(shapes: &mut Vec<LabelledShape>, least: usize) -> (BTreeMap<String, usize>, Vec<String>) {
-    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-    for shape in shapes.iter() {
-        *counts.entry(shape.class.clone()).or_default() += 1;
-    }
-    let left_out = counts
-        .iter()
-        .filter(|&(_, &n)| n < least)
-        .map(|(class, _)| class.clone())
-        .collect();
-    counts.retain(|_, n| *n >= least);
-    shapes.retain(|shape| counts.contains_key(&shape.class));
-    (counts, left_out)
 }

@@ -1,13 +1,11 @@
 //! The figures of an evaluation as files.
 
-use super::evaluate::poses_of;
+use super::evaluate_describe::poses_of;
 use super::folders::LabelledFile;
 use super::{CliError, figures};
 use crate::benchmark::retrieval::RetrievalOutcome;
 use crate::benchmark::{Evaluation, OpenSet, QueryResult};
-use crate::figure::{
-    WorstQuery, evaluation_figures, open_set_figure, retrieval_figure, worst_queries,
-};
+use crate::figure::{WorstQuery, evaluation_figures, open_set_figure, retrieval_figure, worst_queries};
 use crate::mesh::TriangleSoup;
 use std::path::Path;
 
@@ -44,7 +42,12 @@ impl<'a> Figures<'a> {
     pub fn evaluation(&self, evaluation: &Evaluation) -> Result<(), CliError> {
         let Some(dir) = self.dir else { return Ok(()) };
         let mut sheets = evaluation_figures(evaluation)?;
-        let worst: Vec<WorstQuery> = evaluation.queries.iter().take(PICTURES).map(|q| self.picture(q)).collect();
+        let worst: Vec<WorstQuery> = evaluation
+            .queries
+            .iter()
+            .take(PICTURES)
+            .map(|q| self.picture(q))
+            .collect();
         sheets.push(worst_queries(evaluation.protocol.name(), worst)?);
         figures::write(dir, &sheets)
     }
@@ -74,7 +77,10 @@ impl<'a> Figures<'a> {
     fn picture(&self, query: &QueryResult) -> WorstQuery {
         let answered = query.ranked.first().map_or("", |(class, _)| class.as_str());
         let other = |class: &str| self.mesh(class, |name| name != query.name || class != query.class);
-        let stem = query.name.rsplit_once('.').map_or(query.name.as_str(), |(stem, _)| stem);
+        let stem = query
+            .name
+            .rsplit_once('.')
+            .map_or(query.name.as_str(), |(stem, _)| stem);
         WorstQuery {
             label: if answered == query.class {
                 stem.to_owned()

@@ -39,7 +39,10 @@ pub struct FoundFile {
 pub fn found_files(dir: &Path) -> Result<Vec<FoundFile>, CliError> {
     require_folder(dir)?;
     let mut files = Vec::new();
-    let walk = WalkDir::new(dir).follow_links(true).sort_by_file_name().min_depth(1);
+    let walk = WalkDir::new(dir)
+        .follow_links(true)
+        .sort_by_file_name()
+        .min_depth(1);
     for entry in walk.into_iter().filter_entry(|e| !is_hidden(e.file_name())) {
         let entry = entry.map_err(|error| {
             let at = error.path().unwrap_or(dir).to_owned();
@@ -51,7 +54,9 @@ pub fn found_files(dir: &Path) -> Result<Vec<FoundFile>, CliError> {
         }
         let below = path.strip_prefix(dir).unwrap_or(path);
         let mut parts = below.components();
-        let first = parts.next().map(|part| part.as_os_str().to_string_lossy().into_owned());
+        let first = parts
+            .next()
+            .map(|part| part.as_os_str().to_string_lossy().into_owned());
         let rest = parts.as_path();
         let in_subfolder = rest != Path::new("");
         files.push(FoundFile {
@@ -127,7 +132,6 @@ fn is_mesh(path: &Path) -> bool {
         .and_then(|e| e.to_str())
         .is_some_and(|e| EXTENSIONS.contains(&e.to_ascii_lowercase().as_str()))
 }
-
 
 #[cfg(test)]
 mod tests {

@@ -1,8 +1,8 @@
 //! A job, followed to its end.
 
 use super::CliError;
-use super::api::encode;
 use super::client::{CallError, Client, Payload};
+use super::encode::encode;
 use super::progress::Progress;
 use serde_json::Value;
 use std::ops::ControlFlow;

@@ -1,7 +1,7 @@
 //! `shapelex jobs`: background work, listed, shown, followed and cancelled.
 
-use super::api::encode;
 use super::client::{Client, Payload, TargetArgs};
+use super::encode::encode;
 use super::follow::{follow, succeeded};
 use super::listing::{self, Column};
 use super::{CliError, reindex};
@@ -81,7 +81,11 @@ pub fn run(args: &JobsArgs, as_json: bool) -> Result<(), CliError> {
         JobsCommand::Cancel(one) => {
             let client = one.target.client()?;
             let id = listing::cell(&one.find(&client)?, "id");
-            let job = client.call("POST", &format!("/v1/jobs/{}/cancel", encode(&id)), Payload::Empty)?;
+            let job = client.call(
+                "POST",
+                &format!("/v1/jobs/{}/cancel", encode(&id)),
+                Payload::Empty,
+            )?;
             listing::tell(as_json, &job, || format!("job {id} is being stopped"))
         }
     }

@@ -1,7 +1,7 @@
 //! `shapelex keys`: who may use a service.
 
-use super::api::encode;
 use super::client::{Client, Payload, TargetArgs};
+use super::encode::encode;
 use super::{CliError, listing, output};
 use jiff::{SignedDuration, Timestamp};
 use serde_json::{Map, Value, json};

@@ -1,7 +1,7 @@
 //! Lists of a service, page by page, and single objects as lines.
 
-use super::api::encode;
 use super::client::{CallError, Client, Payload};
+use super::encode::encode;
 use super::{CliError, output};
 use serde_json::Value;
 
@@ -59,7 +59,9 @@ pub fn print_one(item: &Value, columns: &[Column], as_json: bool) -> Result<(), 
         .iter()
         .map(|(header, member)| {
             let header = header.trim_start_matches('>');
-            format!("{header:<widest$}  {}", cell(item, member)).trim_end().to_owned()
+            format!("{header:<widest$}  {}", cell(item, member))
+                .trim_end()
+                .to_owned()
         })
         .collect();
     output::line(&lines.join("\n"))

@@ -17,9 +17,12 @@ mod data_dir;
 pub mod demo;
 mod demo_report;
 mod dictionaries;
+mod encode;
 mod error;
 pub mod evaluate;
+pub mod evaluate_args;
 mod evaluate_checks;
+mod evaluate_describe;
 mod evaluate_figures;
 mod evaluation_report;
 mod events;
@@ -64,8 +67,8 @@ pub use error::CliError;
 pub use parameters::ParameterArgs;
 
 use crate::telemetry::{self, LogFormat};
-use parse::ParseError;
 use clap::{Parser, Subcommand};
+use parse::ParseError;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
@@ -106,7 +109,7 @@ pub enum Command {
     /// List, show, follow and cancel background work
     Jobs(jobs::JobsArgs),
     /// Measure accuracy on a folder per class
-    Evaluate(evaluate::EvaluateArgs),
+    Evaluate(evaluate_args::EvaluateArgs),
     /// Measure robustness: deform null shapes, compare methods and baselines
     Benchmark(benchmark_args::BenchmarkArgs),
     /// Show what is read of a file, what cleaning did, how its spectrum begins
@@ -194,5 +197,5 @@ fn quiet_logs() -> Result<(), CliError> {
     let filter = std::env::var("SHAPELEX_LOG").unwrap_or_else(|_| "warn".to_owned());
     telemetry::init(&filter, LogFormat::Text, None)
         .map(drop)
-        .map_err(|error| CliError::Usage(error.to_string()))
+        .map_err(|error| CliError::Usage(format!("SHAPELEX_LOG: {error}")))
 }

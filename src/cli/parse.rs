@@ -50,18 +50,21 @@ fn names(args: &[OsString], long: &str) -> bool {
 
 /// The command, whose places are taken from the arguments only.
 fn without_environment(command: Command, args: &[OsString]) -> Command {
-    let subcommands: Vec<String> = command.get_subcommands().map(|c| c.get_name().to_owned()).collect();
+    let subcommands: Vec<String> = command
+        .get_subcommands()
+        .map(|c| c.get_name().to_owned())
+        .collect();
     let silent: Vec<&str> = PLACES
         .into_iter()
         .filter(|place| !names(args, place))
         .filter(|place| command.get_arguments().any(|arg| arg.get_id() == place))
         .collect();
-    let command = silent
-        .into_iter()
-        .fold(command, |c, place| c.mut_arg(place, |arg| arg.env(NO_VARIABLE).hide_env(true)));
-    subcommands
-        .into_iter()
-        .fold(command, |c, name| c.mut_subcommand(name, |sub| without_environment(sub, args)))
+    let command = silent.into_iter().fold(command, |c, place| {
+        c.mut_arg(place, |arg| arg.env(NO_VARIABLE).hide_env(true))
+    });
+    subcommands.into_iter().fold(command, |c, name| {
+        c.mut_subcommand(name, |sub| without_environment(sub, args))
+    })
 }
 
 /// The line about a wrong value that came out of the environment; `None` where it did not.
@@ -76,7 +79,9 @@ fn of_environment(error: &clap::Error, args: &[OsString]) -> Option<String> {
         ErrorKind::ArgumentConflict => {
             let other = text(ContextKind::PriorArg).unwrap_or_default();
             let other = from_environment(&other, args).map_or(other, |(_, variable, _)| variable);
-            Some(format!("{variable} cannot be used with {other}; unset one of them"))
+            Some(format!(
+                "{variable} cannot be used with {other}; unset one of them"
+            ))
         }
         ErrorKind::InvalidValue => {
             let expected = match error.get(ContextKind::ValidValue) {
@@ -86,7 +91,9 @@ fn of_environment(error: &clap::Error, args: &[OsString]) -> Option<String> {
             Some(format!("{variable}='{value}': {expected}"))
         }
         _ => {
-            let reason = error.source().map_or_else(|| "this value is wrong".to_owned(), ToString::to_string);
+            let reason = error
+                .source()
+                .map_or_else(|| "this value is wrong".to_owned(), ToString::to_string);
             Some(format!("{variable}='{value}': {reason}"))
         }
     }
@@ -103,7 +110,11 @@ fn from_environment(shown: &str, args: &[OsString]) -> Option<(String, String, S
     command.build();
     let variable = variable_of(&command, long)?;
     let value = std::env::var_os(&variable)?;
-    Some((format!("--{long}"), variable, value.to_string_lossy().into_owned()))
+    Some((
+        format!("--{long}"),
+        variable,
+        value.to_string_lossy().into_owned(),
+    ))
 }
 
 /// The environment variable of the first argument of that name, in any subcommand.

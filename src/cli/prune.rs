@@ -1,8 +1,8 @@
 //! What is in the index but no longer in the folder it was made of.
 
-use super::api::encode;
 use super::client::{Client, Payload};
 use super::confirm::ConfirmArgs;
+use super::encode::encode;
 use super::files::MeshFile;
 use super::folders::LabelledFile;
 use super::{CliError, listing};

@@ -29,14 +29,20 @@ pub struct Input {
 pub fn gather(paths: &[PathBuf], name: Option<&str>) -> Result<Vec<Input>, CliError> {
     let standard = paths.iter().filter(|path| *path == Path::new(STDIN)).count();
     if standard > 1 {
-        return Err(CliError::Usage("- is standard input and can be read once".to_owned()));
+        return Err(CliError::Usage(
+            "- is standard input and can be read once".to_owned(),
+        ));
     }
     if name.is_some() && standard == 0 {
-        return Err(CliError::Usage("--name is what standard input is called; name it as -".to_owned()));
+        return Err(CliError::Usage(
+            "--name is what standard input is called; name it as -".to_owned(),
+        ));
     }
     let mut inputs = Vec::new();
     for path in paths {
-        let given = (path == Path::new(STDIN)).then(|| name.map(str::to_owned)).flatten();
+        let given = (path == Path::new(STDIN))
+            .then(|| name.map(str::to_owned))
+            .flatten();
         if path != Path::new(STDIN) && path.is_dir() {
             inputs.extend(found_files(path)?.into_iter().map(|file| Input {
                 path: file.path,

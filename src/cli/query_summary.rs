@@ -146,11 +146,24 @@ mod tests {
         summary.refuse();
         let json = summary.json();
         let counts = &json["summary"];
-        assert_eq!((counts["total"].as_u64(), counts["answered"].as_u64()), (Some(5), Some(4)));
-        assert_eq!((counts["refused"].as_u64(), counts["none_of_these"].as_u64()), (Some(1), Some(1)));
+        assert_eq!(
+            (counts["total"].as_u64(), counts["answered"].as_u64()),
+            (Some(5), Some(4))
+        );
+        assert_eq!(
+            (counts["refused"].as_u64(), counts["none_of_these"].as_u64()),
+            (Some(1), Some(1))
+        );
         assert_eq!(counts["by_class"], json!({ "cat": 1, "dog": 2 }));
-        assert_eq!(counts["tally"]["classes"]["cat"], json!({ "right": 1, "wrong": 1, "none": 1 }));
+        assert_eq!(
+            counts["tally"]["classes"]["cat"],
+            json!({ "right": 1, "wrong": 1, "none": 1 })
+        );
         assert!((counts["tally"]["accuracy"].as_f64().unwrap() - 1.0 / 3.0).abs() < 1e-15);
-        assert!(summary.text().contains("4 of 5 meshes answered, 1 refused; 1 of none"));
+        assert!(
+            summary
+                .text()
+                .contains("4 of 5 meshes answered, 1 refused; 1 of none")
+        );
     }
 }

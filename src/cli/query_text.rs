@@ -46,7 +46,8 @@ pub fn text(path: &Path, answer: &Value) -> String {
     let cells: Vec<Vec<String>> = rows
         .into_iter()
         .map(|row| {
-            let shown = |value: Option<f64>, write: &dyn Fn(f64) -> String| value.map(write).unwrap_or_default();
+            let shown =
+                |value: Option<f64>, write: &dyn Fn(f64) -> String| value.map(write).unwrap_or_default();
             let mut cells = vec![
                 row.rank.to_string(),
                 row.class.name,
@@ -89,7 +90,12 @@ pub fn warn_once(answer: &mut Value) {
 fn warnings(answer: &Value) -> Vec<String> {
     let mut kept: Vec<String> = Vec::new();
     let both = [&answer["warnings"], &answer["mesh"]["warnings"]];
-    for warning in both.into_iter().filter_map(Value::as_array).flatten().filter_map(Value::as_str) {
+    for warning in both
+        .into_iter()
+        .filter_map(Value::as_array)
+        .flatten()
+        .filter_map(Value::as_str)
+    {
         if !warning.starts_with("The mesh was simplified from ") && !kept.iter().any(|k| k == warning) {
             kept.push(warning.to_owned());
         }

@@ -57,7 +57,10 @@ pub fn text(job: &Value) -> String {
     );
     for skipped in result["skipped"].as_array().into_iter().flatten() {
         let name = listing::cell(skipped, "class.name");
-        text += &format!("\nclass {name} was left out: {}", listing::cell(skipped, "reason"));
+        text += &format!(
+            "\nclass {name} was left out: {}",
+            listing::cell(skipped, "reason")
+        );
     }
     text
 }
@@ -67,7 +70,10 @@ pub fn text(job: &Value) -> String {
 /// # Errors
 /// [`CliError::Reported`] where there are some.
 pub fn warn_of_failed_shapes(job: &Value) -> Result<(), CliError> {
-    let failed = job["result"]["failed_shapes"].as_array().map(Vec::as_slice).unwrap_or_default();
+    let failed = job["result"]["failed_shapes"]
+        .as_array()
+        .map(Vec::as_slice)
+        .unwrap_or_default();
     for shape in failed {
         eprintln!(
             "shapelex: shape {} of class {} was left out: {}",
@@ -76,5 +82,9 @@ pub fn warn_of_failed_shapes(job: &Value) -> Result<(), CliError> {
             listing::cell(shape, "detail")
         );
     }
-    if failed.is_empty() { Ok(()) } else { Err(CliError::Reported) }
+    if failed.is_empty() {
+        Ok(())
+    } else {
+        Err(CliError::Reported)
+    }
 }

@@ -1,10 +1,10 @@
 //! `shapelex shapes`: the training shapes of a class.
 
-use super::api::encode;
+use super::CliError;
 use super::client::{Payload, TargetArgs};
 use super::confirm::ConfirmArgs;
+use super::encode::encode;
 use super::listing::{self, Column};
-use super::CliError;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -93,7 +93,11 @@ pub enum ShapesCommand {
 
 impl OneShape {
     fn path(&self) -> String {
-        format!("/v1/classes/{}/shapes/{}", encode(&self.class), encode(&self.shape))
+        format!(
+            "/v1/classes/{}/shapes/{}",
+            encode(&self.class),
+            encode(&self.shape)
+        )
     }
 }
 
@@ -125,7 +129,9 @@ pub fn run(args: &ShapesArgs, as_json: bool) -> Result<(), CliError> {
             confirm.ask(&format!("Delete shape {name} of class {}", shape.class))?;
             client.call("DELETE", &shape.path(), Payload::Empty)?;
             let told = json!({ "deleted": found["id"], "name": found["name"] });
-            listing::tell(as_json, &told, || format!("deleted shape {name} of class {}", shape.class))
+            listing::tell(as_json, &told, || {
+                format!("deleted shape {name} of class {}", shape.class)
+            })
         }
         ShapesCommand::Download { shape, out, target } => download(shape, out.as_deref(), target, as_json),
     }
@@ -149,7 +155,10 @@ fn download(
             let fallback = || PathBuf::from(format!("{}.{}", shape.shape, listing::cell(&found, "format")));
             let out = file.unwrap_or_else(fallback);
             if out.exists() {
-                return Err(CliError::at(&out, "this file is there already; --out FILE names another"));
+                return Err(CliError::at(
+                    &out,
+                    "this file is there already; --out FILE names another",
+                ));
             }
             out
         }

@@ -1,8 +1,8 @@
 //! `shapelex snapshot`: everything a service holds, as one file, and back.
 
 use super::CliError;
-use super::api::encode;
 use super::client::{Payload, TargetArgs};
+use super::encode::encode;
 use super::listing::{self, Column, tell};
 use crate::model::SnapshotId;
 use serde_json::{Value, json};
@@ -118,7 +118,11 @@ fn restore(snapshot: &str, target: &TargetArgs, as_json: bool) -> Result<(), Cli
         client.send_file("/v1/snapshots/restore", "application/zstd", &file)?
     } else {
         if snapshot.parse::<SnapshotId>().is_err() {
-            let what = if file.is_dir() { "this is a folder" } else { "there is no such file" };
+            let what = if file.is_dir() {
+                "this is a folder"
+            } else {
+                "there is no such file"
+            };
             return Err(CliError::Usage(format!(
                 "{snapshot}: {what}, and no snapshot has such an id; `shapelex snapshot list` shows those there are"
             )));

@@ -129,7 +129,10 @@ impl Client {
     }
 }
 
-pub(super) fn authorized(request: ureq::http::request::Builder, key: Option<&str>) -> ureq::http::request::Builder {
+pub(super) fn authorized(
+    request: ureq::http::request::Builder,
+    key: Option<&str>,
+) -> ureq::http::request::Builder {
     match key {
         Some(key) => request.header("authorization", format!("Bearer {key}")),
         None => request,

@@ -49,7 +49,9 @@ pub fn detail(place: &Place, code: &str, detail: &str) -> String {
         ("unsupported_media_type" | "no_files", _) => {
             "the format was not recognised; shapelex reads OBJ, glTF, GLB, PLY, STL and OFF".to_owned()
         }
-        ("empty_body", _) => "the file is empty; expected a mesh as OBJ, glTF, GLB, PLY, STL or OFF".to_owned(),
+        ("empty_body", _) => {
+            "the file is empty; expected a mesh as OBJ, glTF, GLB, PLY, STL or OFF".to_owned()
+        }
         ("missing_buffer", _) => missing_buffer(detail),
         ("invalid_snapshot", _) => detail.replace("send a snapshot's file as the body", "the file is empty"),
         ("recovery_mode", Place::Data(_)) => {
@@ -64,7 +66,9 @@ pub fn detail(place: &Place, code: &str, detail: &str) -> String {
         ("internal" | "coding_failed", Place::Data(_)) if detail.contains("request id") => {
             "an unexpected fault; the lines above say which, SHAPELEX_LOG=debug shows more".to_owned()
         }
-        ("not_ready", Place::Data(_)) => "the data directory is not ready; the lines above say why".to_owned(),
+        ("not_ready", Place::Data(_)) => {
+            "the data directory is not ready; the lines above say why".to_owned()
+        }
         _ => detail.to_owned(),
     }
 }
@@ -73,7 +77,9 @@ pub fn detail(place: &Place, code: &str, detail: &str) -> String {
 pub fn mesh_error(error: &MeshError) -> String {
     match error {
         MeshError::MissingBuffer { .. } => missing_buffer(&error.to_string()),
-        MeshError::Empty => error.to_string().replace("; send a mesh as", "; expected a mesh as"),
+        MeshError::Empty => error
+            .to_string()
+            .replace("; send a mesh as", "; expected a mesh as"),
         other => other.to_string(),
     }
 }
@@ -94,7 +100,16 @@ mod tests {
     use crate::http::problem::Problem;
     use crate::store::StoreError;
 
-    const LOCAL: [&str; 8] = ["POST", "GET", "/v1", "/readyz", "request", "multipart", "body", "upload;"];
+    const LOCAL: [&str; 8] = [
+        "POST",
+        "GET",
+        "/v1",
+        "/readyz",
+        "request",
+        "multipart",
+        "body",
+        "upload;",
+    ];
 
     /// The problems whose detail speaks of requests, as the service makes them.
     fn problems() -> Vec<Problem> {

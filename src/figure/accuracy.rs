@@ -49,7 +49,11 @@ pub fn class_accuracy(title: &str, classes: &[ClassAccuracy]) -> Result<String, 
     let bottom = TOP + ROW * classes.len() as f64;
     let axis_label = "right answers; the lines are 95 % intervals";
     let width = (left + LENGTH + 16.0 + behind).max(left + text_width(axis_label, 13.0)) + 16.0;
-    let said: Vec<String> = names.iter().zip(&counts).map(|(n, c)| format!("{n} {c}")).collect();
+    let said: Vec<String> = names
+        .iter()
+        .zip(&counts)
+        .map(|(n, c)| format!("{n} {c}"))
+        .collect();
     let description = format!("Right answers per class: {}.", said.join("; "));
     draw(title, &description, (width, bottom + 50.0), |root| {
         let tick = font(12.0, INK, HPos::Center, VPos::Center);

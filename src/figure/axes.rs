@@ -132,7 +132,12 @@ impl Plot {
         }
         if !self.y.label.is_empty() {
             let beside = left - self.y.width() + TITLE / 2.0;
-            canvas::write(area, &self.y.label, (beside, top + height / 2.0), &upwards(&title))?;
+            canvas::write(
+                area,
+                &self.y.label,
+                (beside, top + height / 2.0),
+                &upwards(&title),
+            )?;
         }
         Ok(())
     }

@@ -67,7 +67,13 @@ pub fn cost_curves(title: &str, axes: CostAxes<'_>, series: &[Series]) -> Result
             .zip(&labels)
             .map(|(s, label)| {
                 let points: Vec<(i32, i32)> = positive(&s.points).map(|p| plot.place(p)).collect();
-                (label.clone(), Line { marks: points.clone(), points })
+                (
+                    label.clone(),
+                    Line {
+                        marks: points.clone(),
+                        points,
+                    },
+                )
             })
             .collect()
     })

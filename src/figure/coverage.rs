@@ -32,7 +32,11 @@ pub fn coverage(title: &str, measured: &[Series]) -> Result<String, FigureError>
             .enumerate()
             .map(|(i, series)| {
                 let points: Vec<(i32, i32)> = series.points.iter().map(|&p| plot.place(p)).collect();
-                let marks = if i < measured.len() { points.clone() } else { Vec::new() };
+                let marks = if i < measured.len() {
+                    points.clone()
+                } else {
+                    Vec::new()
+                };
                 (series.label.clone(), Line { points, marks })
             })
             .collect()

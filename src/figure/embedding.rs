@@ -69,11 +69,18 @@ pub fn embedding(title: &str, unit: &str, points: &[EmbeddedPoint]) -> Result<St
         axis("second", (y - half, y + half)),
     );
     let named = points.len() <= NAMED;
-    let longest = points.iter().filter(|_| named).map(|p| text_width(&label(&p.label), NAME));
+    let longest = points
+        .iter()
+        .filter(|_| named)
+        .map(|p| text_width(&label(&p.label), NAME));
     // A name may stand on either side of a point at the edge.
     let overhang = (longest.fold(0.0, f64::max) + 12.0 - PLOT.0 * 0.1).max(0.0);
     let left = 16.0 + y.width().max(overhang);
-    let side = if groups.is_empty() { overhang } else { overhang + legend_width(&groups) };
+    let side = if groups.is_empty() {
+        overhang
+    } else {
+        overhang + legend_width(&groups)
+    };
     let height = (TOP + PLOT.1 + x.height()).max(TOP + legend_height(&groups)) + 16.0;
     let plot = Plot {
         at: (left, TOP),
@@ -81,21 +88,31 @@ pub fn embedding(title: &str, unit: &str, points: &[EmbeddedPoint]) -> Result<St
         x,
         y,
     };
-    draw(title, &description, (left + PLOT.0 + side + 16.0, height), |root| {
-        plot.draw(root)?;
-        let places: Vec<(i32, i32)> = points.iter().map(|p| plot.place(p.at)).collect();
-        let kind = |p: &EmbeddedPoint| groups.iter().position(|g| *g == p.group).unwrap_or(0);
-        for (point, &at) in points.iter().zip(&places) {
-            mark(root, at, kind(point))?;
-        }
-        if named {
-            name_points(root, points, &places, &kind)?;
-        }
-        if groups.is_empty() {
-            return Ok(());
-        }
-        legend(root, &groups, (left + PLOT.0 + overhang + 24.0, TOP + 12.0), false)
-    })
+    draw(
+        title,
+        &description,
+        (left + PLOT.0 + side + 16.0, height),
+        |root| {
+            plot.draw(root)?;
+            let places: Vec<(i32, i32)> = points.iter().map(|p| plot.place(p.at)).collect();
+            let kind = |p: &EmbeddedPoint| groups.iter().position(|g| *g == p.group).unwrap_or(0);
+            for (point, &at) in points.iter().zip(&places) {
+                mark(root, at, kind(point))?;
+            }
+            if named {
+                name_points(root, points, &places, &kind)?;
+            }
+            if groups.is_empty() {
+                return Ok(());
+            }
+            legend(
+                root,
+                &groups,
+                (left + PLOT.0 + overhang + 24.0, TOP + 12.0),
+                false,
+            )
+        },
+    )
 }
 
 /// A box in pixels: left, top, right, bottom.

@@ -2,8 +2,8 @@
 
 use super::results::{class_embedding, dissimilarity};
 use super::{
-    ClassAccuracy, FigureError, GalleryRow, HeatMap, RowView, Series, Sheet, class_accuracy, coverage, gallery,
-    heat_map, precision_recall,
+    ClassAccuracy, FigureError, GalleryRow, HeatMap, RowView, Series, Sheet, class_accuracy, coverage,
+    gallery, heat_map, precision_recall,
 };
 use crate::benchmark::measures::RetrievalMeasures;
 use crate::benchmark::report::{ClassMatrix, TOTAL};
@@ -134,7 +134,10 @@ fn confusion(
         })
         .collect();
     let written = |n: &usize| if *n == 0 { String::new() } else { n.to_string() };
-    let texts: Vec<Vec<String>> = answers.iter().map(|row| row.iter().map(written).collect()).collect();
+    let texts: Vec<Vec<String>> = answers
+        .iter()
+        .map(|row| row.iter().map(written).collect())
+        .collect();
     let map = HeatMap {
         row_axis: "true class",
         column_axis: "answered class",
@@ -167,7 +170,10 @@ pub fn retrieval_figure(outcome: &RetrievalOutcome) -> Result<Sheet, FigureError
     }
     let curve = Series {
         label: format!("mAP {:.3}", outcome.measures.average_precision),
-        points: RetrievalMeasures::recalls().into_iter().zip(precision.iter().copied()).collect(),
+        points: RetrievalMeasures::recalls()
+            .into_iter()
+            .zip(precision.iter().copied())
+            .collect(),
     };
     let title = format!("Retrieval, shape against shape: {} queries", outcome.total);
     Ok(Sheet::new(
@@ -183,7 +189,11 @@ pub fn retrieval_figure(outcome: &RetrievalOutcome) -> Result<Sheet, FigureError
 pub fn open_set_figure(open_set: &OpenSet) -> Result<Sheet, FigureError> {
     let series = |label: &str, pick: &dyn Fn(&crate::benchmark::AtLevel) -> f64| Series {
         label: label.to_owned(),
-        points: open_set.by_level.iter().map(|at| (1.0 - at.level, pick(at))).collect(),
+        points: open_set
+            .by_level
+            .iter()
+            .map(|at| (1.0 - at.level, pick(at)))
+            .collect(),
     };
     let title = format!("Possible classes of {} queries", open_set.covered.total);
     Ok(Sheet::new(

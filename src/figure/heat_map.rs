@@ -79,7 +79,7 @@ fn check(map: &HeatMap<'_>) -> Result<(), FigureError> {
     for row in map.values {
         fits("columns", map.columns.len(), row.len())?;
     }
-    for texts in map.texts {
+    if let Some(texts) = map.texts {
         fits("rows of texts", map.rows.len(), texts.len())?;
         for row in texts {
             fits("columns of texts", map.columns.len(), row.len())?;
@@ -136,7 +136,12 @@ impl Layout {
         let top = 76.0 + longest(map.columns, name_size).max(aside(map.row_axis, down) - 40.0);
         let bar_ticks = if map.shares {
             linear(range, 5, Quantity::Share)
-        } else if map.values.iter().flatten().all(|v| !v.is_finite() || is_count(*v)) {
+        } else if map
+            .values
+            .iter()
+            .flatten()
+            .all(|v| !v.is_finite() || is_count(*v))
+        {
             linear(range, 5, Quantity::Count)
         } else {
             linear(range, 5, Quantity::Real)
@@ -177,7 +182,12 @@ fn names(root: &Area<'_>, map: &HeatMap<'_>, at: &Layout) -> Result<(), FigureEr
     }
     let axis = font(AXIS, MUTED, HPos::Center, VPos::Center);
     canvas::write(root, map.column_axis, (at.left + at.across / 2.0, 54.0), &axis)?;
-    canvas::write(root, map.row_axis, (14.0, at.top + at.down / 2.0), &upwards(&axis))
+    canvas::write(
+        root,
+        map.row_axis,
+        (14.0, at.top + at.down / 2.0),
+        &upwards(&axis),
+    )
 }
 
 /// Fills the cells and writes into them where there is room.
@@ -210,8 +220,18 @@ fn cells(root: &Area<'_>, map: &HeatMap<'_>, at: &Layout, range: (f64, f64)) -> 
                 continue;
             }
             let fitting = side * 0.9 / text_width(&text, 1.0).max(1e-9);
-            let style = font((at.cell * 0.25).min(fitting), ink_on(colour), HPos::Center, VPos::Center);
-            canvas::write(root, &text, (corner.0 + side / 2.0, corner.1 + side / 2.0), &style)?;
+            let style = font(
+                (at.cell * 0.25).min(fitting),
+                ink_on(colour),
+                HPos::Center,
+                VPos::Center,
+            );
+            canvas::write(
+                root,
+                &text,
+                (corner.0 + side / 2.0, corner.1 + side / 2.0),
+                &style,
+            )?;
         }
     }
     Ok(())

@@ -103,7 +103,12 @@ fn draw_panel(
     names: &[&str],
 ) -> Result<(), FigureError> {
     let heading = font(12.5, INK, HPos::Center, VPos::Center);
-    canvas::write(root, &label(&panel.title), (left + width / 2.0 + 14.0, top + 10.0), &heading)?;
+    canvas::write(
+        root,
+        &label(&panel.title),
+        (left + width / 2.0 + 14.0, top + 10.0),
+        &heading,
+    )?;
     let x = Axis::linear("", (0.0, largest), 4, Quantity::Real);
     let y = Axis::linear("", (0.0, greatest * 1.05), 4, Quantity::Share);
     let plot = Plot {

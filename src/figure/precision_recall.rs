@@ -21,8 +21,18 @@ pub fn precision_recall(title: &str, methods: &[Series]) -> Result<String, Figur
     }
     let names: Vec<&str> = methods.iter().map(|s| s.label.as_str()).collect();
     let description = format!("Precision over recall for {}.", names.join(", "));
-    let x = Axis::linear("recall (share of the relevant found)", (0.0, 1.0), 5, Quantity::Share);
-    let y = Axis::linear("precision (share of the found relevant)", (0.0, 1.02), 5, Quantity::Share);
+    let x = Axis::linear(
+        "recall (share of the relevant found)",
+        (0.0, 1.0),
+        5,
+        Quantity::Share,
+    );
+    let y = Axis::linear(
+        "precision (share of the found relevant)",
+        (0.0, 1.02),
+        5,
+        Quantity::Share,
+    );
     line_chart(title, &description, (x, y), &|plot| {
         methods
             .iter()

@@ -27,7 +27,10 @@ pub struct Sheet {
 impl Sheet {
     /// A sheet of that name.
     pub(super) fn new(name: impl Into<String>, svg: String) -> Self {
-        Self { name: name.into(), svg }
+        Self {
+            name: name.into(),
+            svg,
+        }
     }
 }
 

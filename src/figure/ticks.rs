@@ -46,7 +46,11 @@ pub(super) fn linear((low, high): (f64, f64), aim: usize, quantity: Quantity) ->
             };
             Tick {
                 at: value / unit,
-                text: if quantity == Quantity::Share { format!("{number} %") } else { number },
+                text: if quantity == Quantity::Share {
+                    format!("{number} %")
+                } else {
+                    number
+                },
             }
         })
         .collect()
@@ -55,7 +59,9 @@ pub(super) fn linear((low, high): (f64, f64), aim: usize, quantity: Quantity) ->
 /// The least of 1, 2, 5, 10 … times a power of ten that is no less.
 fn step(raw: f64) -> f64 {
     let power = 10f64.powf(raw.log10().floor());
-    let nice = [1.0, 2.0, 5.0, 10.0].into_iter().find(|n| n * power >= raw * (1.0 - 1e-9));
+    let nice = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .find(|n| n * power >= raw * (1.0 - 1e-9));
     nice.unwrap_or(10.0) * power
 }
 
@@ -108,15 +114,27 @@ mod tests {
 
     #[test]
     fn counts_are_whole_and_nothing_is_written_twice() {
-        assert_eq!(texts(&linear((0.0, 3.0), 5, Quantity::Count)), ["0", "1", "2", "3"]);
+        assert_eq!(
+            texts(&linear((0.0, 3.0), 5, Quantity::Count)),
+            ["0", "1", "2", "3"]
+        );
         assert_eq!(texts(&linear((0.0, 1.0), 4, Quantity::Count)), ["0", "1"]);
-        assert_eq!(texts(&linear((0.0, 0.02), 4, Quantity::Share)), ["0.0 %", "0.5 %", "1.0 %", "1.5 %", "2.0 %"]);
-        assert_eq!(texts(&linear((0.0, 1.0), 5, Quantity::Share)), ["0 %", "20 %", "40 %", "60 %", "80 %", "100 %"]);
+        assert_eq!(
+            texts(&linear((0.0, 0.02), 4, Quantity::Share)),
+            ["0.0 %", "0.5 %", "1.0 %", "1.5 %", "2.0 %"]
+        );
+        assert_eq!(
+            texts(&linear((0.0, 1.0), 5, Quantity::Share)),
+            ["0 %", "20 %", "40 %", "60 %", "80 %", "100 %"]
+        );
         for (low, high) in [(0.377, 0.378), (-0.3, 0.3), (0.0, 1e-9), (1e8, 1.1e8), (5.0, 5.3)] {
             for aim in 2..8 {
                 let ticks = linear((low, high), aim, Quantity::Real);
                 let mut unique = texts(&ticks);
-                assert!(unique.len() >= 2 && unique.len() <= aim + 2, "{low} {high}: {unique:?}");
+                assert!(
+                    unique.len() >= 2 && unique.len() <= aim + 2,
+                    "{low} {high}: {unique:?}"
+                );
                 unique.dedup();
                 assert_eq!(unique.len(), ticks.len(), "{unique:?}");
             }
@@ -128,7 +146,10 @@ mod tests {
     #[test]
     fn logarithmic_axes_have_powers_or_what_fits() {
         assert_eq!(texts(&logarithmic((1e3, 1e6), 7)), ["1k", "10k", "100k", "1M"]);
-        assert_eq!(texts(&logarithmic((1.0, 100.0), 7)), ["1", "2", "5", "10", "20", "50", "100"]);
+        assert_eq!(
+            texts(&logarithmic((1.0, 100.0), 7)),
+            ["1", "2", "5", "10", "20", "50", "100"]
+        );
         let narrow = logarithmic((1100.0, 1400.0), 5);
         assert!(narrow.len() >= 3, "{narrow:?}");
         let wide = logarithmic((1e-12, 1e12), 7);

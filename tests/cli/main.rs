@@ -1,11 +1,14 @@
 //! The built binary, as a shell sees it.
 
 mod benchmark;
+mod catalogue;
 mod commands;
 mod configuration;
+mod https;
 mod keys;
 mod readme;
 mod service;
+mod usage;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -2,8 +2,9 @@
 
 use shapelex::benchmark::deform::Deformation;
 use shapelex::figure::{
-    Bar, CostAxes, EmbeddedPoint, FigureError, GalleryRow, HeatMap, Histogram, HistogramPanel, Series, bars,
-    between_classes, classical_mds, cost_curves, embedding, gallery, heat_map, histograms, precision_recall,
+    Bar, ClassAccuracy, CostAxes, EmbeddedPoint, FigureError, GalleryRow, HeatMap, Histogram, HistogramPanel,
+    RowView, Series, bars, between_classes, class_accuracy, classical_mds, cost_curves, coverage, embedding,
+    gallery, heat_map, histograms, precision_recall,
 };
 use shapelex::sample::{ZooOptions, species};
 
@@ -51,8 +52,53 @@ fn well_formed(svg: &str) -> Vec<String> {
     texts
 }
 
+/// An attribute of a tag.
+fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
+    let rest = &tag[tag.find(&format!(" {name}=\""))? + name.len() + 3..];
+    rest.split('"').next()
+}
+
+/// Checks that every text begins and ends inside the figure, by Helvetica's mean width of a letter.
+fn nothing_is_cut(svg: &str) {
+    let (_, drawn) = svg.split_once("viewBox=\"0 0 ").unwrap();
+    let size: Vec<f64> = drawn
+        .split('"')
+        .next()
+        .unwrap()
+        .split(' ')
+        .map(|n| n.parse().unwrap())
+        .collect();
+    let mut seen = 0;
+    for piece in svg.split("<text ").skip(1) {
+        let (tag, rest) = piece.split_once('>').unwrap();
+        let tag = format!(" {tag}");
+        let text = rest.split('<').next().unwrap().trim();
+        let number = |name: &str| attribute(&tag, name).unwrap().parse::<f64>().unwrap();
+        let (x, y) = (number("x"), number("y"));
+        let length = 0.5 * number("font-size") * text.chars().count() as f64;
+        let before = match attribute(&tag, "text-anchor") {
+            Some("middle") => 0.5,
+            Some("end") => 1.0,
+            _ => 0.0,
+        };
+        let (from, to) = (-before * length, (1.0 - before) * length);
+        let (low, high, limit) = if tag.contains("rotate(270") || tag.contains("rotate(-90") {
+            (y - to, y - from, size[1])
+        } else {
+            (x + from, x + to, size[0])
+        };
+        assert!(
+            low >= -1.0 && high <= limit + 1.0,
+            "'{text}' from {low} to {high} of {limit}"
+        );
+        seen += 1;
+    }
+    assert!(seen > 0);
+}
+
 fn says(svg: &str, labels: &[&str]) {
     let texts = well_formed(svg);
+    nothing_is_cut(svg);
     for label in labels {
         assert!(texts.iter().any(|t| t == label), "no '{label}' in {texts:?}");
     }
@@ -90,6 +136,7 @@ fn a_gallery_shows_every_deformation_and_stays_small() {
             let mut meshes = vec![Some(null.clone())];
             meshes.extend(Deformation::ALL.map(|d| Some(d.apply(&null, 4, 1))));
             GalleryRow {
+                view: RowView::Shared,
                 label: kind.name().to_owned(),
                 meshes,
             }
@@ -209,17 +256,21 @@ fn a_heat_map_names_rows_columns_and_values() {
         rows: &labels,
         columns: &labels,
         values: &values,
+        texts: None,
+        shares: false,
     };
     let svg = heat_map("Dissimilarity of classes", &map).unwrap();
     says(&svg, &CLASSES);
     says(&svg, &["class of the query", "mean objective", "–", "0.3770"]);
-    let long = "a class with a name that is much too long for its place".to_owned();
+    let long = "a class with a name that is much longer than most names are".to_owned();
     let odd = HeatMap {
-        rows: &[long],
+        rows: std::slice::from_ref(&long),
         values: &values[..1],
         ..map.clone()
     };
-    well_formed(&heat_map("One row", &odd).unwrap());
+    let svg = heat_map("One row", &odd).unwrap();
+    says(&svg, &[&long]);
+    nothing_is_cut(&svg);
     let ragged = HeatMap {
         columns: &labels[..4],
         ..map
@@ -361,6 +412,7 @@ fn an_evaluation_gives_confusion_dissimilarity_and_embedding() {
         files,
         [
             "even-odd-confusion.svg",
+            "even-odd-accuracy.svg",
             "even-odd-dissimilarity.svg",
             "even-odd-mds.svg"
         ]
@@ -369,11 +421,17 @@ fn an_evaluation_gives_confusion_dissimilarity_and_embedding() {
         &sheets[0].svg,
         &["Answers of even/odd: 6 of 6 right", "elephant", "1"],
     );
-    says(&sheets[1].svg, &["0.3770"]);
-    says(&sheets[2].svg, &CLASSES);
+    says(&sheets[0].svg, &["share of the class&apos;s queries", "100 %"]);
+    says(&sheets[1].svg, &["Accuracy by class, even/odd", "1 of 1, 100 %"]);
+    says(&sheets[2].svg, &["0.3770", "class of the queries"]);
+    assert!(
+        !sheets[2].svg.contains("deformed"),
+        "these are no deformed shapes"
+    );
+    says(&sheets[3].svg, &CLASSES);
     // A class that some were not compared with leaves a gap, and no plane.
     evaluation.queries[0].ranked.truncate(3);
-    assert_eq!(evaluation_figures(&evaluation).unwrap().len(), 2);
+    assert_eq!(evaluation_figures(&evaluation).unwrap().len(), 3);
     evaluation.queries.clear();
     assert!(evaluation_figures(&evaluation).is_err());
 }
@@ -448,4 +506,174 @@ fn a_report_gives_the_papers_figures() {
         &[named[0].0, named[1].0, named[3].0, named[4].0, "shot noise"],
     );
     assert!(!sheet.svg.contains(&format!(">\n{}\n<", named[2].0)));
+}
+
+#[test]
+fn long_names_are_whole_in_every_figure() {
+    let long = "a creature with an uncommonly long and winding name".to_owned();
+    let list = vec![
+        Bar {
+            label: long.clone(),
+            value: 0.4,
+        },
+        Bar {
+            label: "W".repeat(60),
+            value: 0.5,
+        },
+    ];
+    says(&bars("Bars", "mean objective", &list).unwrap(), &[&long]);
+    let accuracy = [ClassAccuracy {
+        class: long.clone(),
+        correct: 3,
+        total: 7,
+    }];
+    says(
+        &class_accuracy("Accuracy", &accuracy).unwrap(),
+        &[&long, "3 of 7, 43 %"],
+    );
+    let series = [Series {
+        label: long.clone(),
+        points: vec![(0.5, 0.9), (1.0, 0.2)],
+    }];
+    says(&precision_recall("Curves", &series).unwrap(), &[&long]);
+    says(&coverage("Coverage", &series).unwrap(), &[&long, "as promised"]);
+    let points: Vec<EmbeddedPoint> = [(0.0, 0.0), (1.0, 0.5), (-1.0, 0.1)]
+        .map(|at| EmbeddedPoint {
+            label: long.clone(),
+            group: String::new(),
+            at,
+        })
+        .to_vec();
+    says(&embedding("Plane", "units", &points).unwrap(), &[&long]);
+    let panel = HistogramPanel {
+        title: long.clone(),
+        main: Histogram {
+            label: "null".to_owned(),
+            shares: vec![0.004, 0.006],
+        },
+        others: Vec::new(),
+    };
+    says(
+        &histograms("Distances", "distance", 0.8, &[panel]).unwrap(),
+        &[&long],
+    );
+    let title =
+        "A title that is much wider than the one small bar below it, and that is still read to its end";
+    says(&bars(title, "value", &list[..1]).unwrap(), &[title]);
+}
+
+/// The texts of ticks that are written more than once in one figure.
+fn repeated_numbers(svg: &str, unit: &str) -> Vec<String> {
+    let texts = well_formed(svg);
+    let numbers: Vec<&String> = texts
+        .iter()
+        .filter(|t| t.ends_with(unit) && t.len() > unit.len())
+        .collect();
+    let twice = |t: &&&String| numbers.iter().filter(|other| other == t).count() > 1;
+    numbers.iter().filter(twice).map(|t| (**t).clone()).collect()
+}
+
+#[test]
+fn ticks_are_whole_for_counts_and_never_written_twice() {
+    // Shares below one percent were all written "0 %" or "1 %".
+    let panel = HistogramPanel {
+        title: "small".to_owned(),
+        main: Histogram {
+            label: "null".to_owned(),
+            shares: vec![0.004, 0.006, 0.011],
+        },
+        others: Vec::new(),
+    };
+    let svg = histograms("Distances", "distance", 0.8, &[panel]).unwrap();
+    assert_eq!(repeated_numbers(&svg, " %"), Vec::<String>::new());
+    // Counts up to 2 had ticks at 0.5 and 1.5.
+    let labels = names(&["a", "b"]);
+    let values = [vec![2.0, 0.0], vec![1.0, 1.0]];
+    let map = HeatMap {
+        row_axis: "row",
+        column_axis: "column",
+        value: "queries",
+        rows: &labels,
+        columns: &labels,
+        values: &values,
+        texts: None,
+        shares: false,
+    };
+    let svg = heat_map("Counts", &map).unwrap();
+    let ticks = well_formed(&svg);
+    assert!(
+        ticks
+            .iter()
+            .all(|t| t.parse::<f64>().is_err() || !t.contains('.')),
+        "{ticks:?}"
+    );
+}
+
+#[test]
+fn a_confusion_is_coloured_by_the_share_of_the_class() {
+    use shapelex::benchmark::{Evaluation, Protocol, QueryResult};
+    use shapelex::figure::evaluation_figures;
+
+    let query = |class: &str, answered: &str, i: usize| QueryResult {
+        class: class.to_owned(),
+        name: i.to_string(),
+        ranked: vec![(answered.to_owned(), 0.1), ("other".to_owned(), 0.2)],
+        correct: class == answered,
+        true_rank: 1 + usize::from(class != answered),
+        error_margin: 0.0,
+    };
+    // A hundred queries of one class and two of another, all right: both rows are equally right.
+    let mut queries: Vec<QueryResult> = (0..100).map(|i| query("many", "many", i)).collect();
+    queries.extend((0..2).map(|i| query("few", "few", i)));
+    let evaluation = Evaluation {
+        protocol: Protocol::LeaveOneOut,
+        correct: 102,
+        total: 102,
+        queries,
+        confusion: std::collections::BTreeMap::new(),
+        not_queried: 0,
+    };
+    let svg = &evaluation_figures(&evaluation).unwrap()[0].svg;
+    says(svg, &["100", "2"]);
+    let brightest = svg.matches("fill=\"#FEE838\"").count();
+    assert!(brightest >= 2, "{brightest} cells of the brightest colour");
+}
+
+#[test]
+fn the_worst_queries_are_shown_beside_what_they_were_taken_for() {
+    use shapelex::figure::{WorstQuery, worst_queries};
+    let options = ZooOptions {
+        upright: true,
+        min_vertices: 900,
+        max_vertices: 1200,
+    };
+    let meshes: Vec<_> = species(1, 3)
+        .iter()
+        .map(|kind| kind.pose(1, 0, &options).unwrap())
+        .collect();
+    let worst = vec![
+        WorstQuery {
+            label: "cat-03 as a class with a long name".to_owned(),
+            query: Some(meshes[0].clone()),
+            answered: Some(meshes[1].clone()),
+            own: Some(meshes[2].clone()),
+        },
+        WorstQuery {
+            label: "dog-01".to_owned(),
+            query: Some(meshes[1].clone()),
+            answered: None,
+            own: Some(meshes[0].clone()),
+        },
+    ];
+    let sheet = worst_queries("even/odd", worst).unwrap();
+    assert_eq!(sheet.name, "even-odd-worst.svg");
+    says(
+        &sheet.svg,
+        &[
+            "query",
+            "answered class",
+            "own class",
+            "cat-03 as a class with a long name",
+        ],
+    );
 }
