@@ -1,7 +1,7 @@
 //! What `shapelex evaluate` is asked to do.
 
 use super::ParameterArgs;
-use super::values::at_least_one;
+use super::values::{at_least_one, poses};
 use std::path::PathBuf;
 
 /// A protocol by name; the numbers come from other flags.
@@ -40,7 +40,7 @@ pub struct EvaluateArgs {
     #[arg(long, value_name = "COUNT", default_value_t = 2, value_parser = at_least_one)]
     pub min_shapes: usize,
     /// Sample this many poses of every animated glTF; other files count once
-    #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
+    #[arg(long, value_name = "COUNT", value_parser = poses)]
     pub poses: Option<usize>,
     /// Independent draws of one-shot and open-set
     #[arg(long, value_name = "COUNT", default_value_t = 5, value_parser = at_least_one)]

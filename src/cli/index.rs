@@ -74,6 +74,13 @@ pub fn run(args: &IndexArgs, json: bool) -> Result<(), CliError> {
     if args.prune {
         args.confirm.can_ask()?;
     }
+    // A service has a limit of its own.
+    let most = Limits::default().max_poses;
+    if args.target.server.is_none() && args.poses.is_some_and(|poses| poses > most) {
+        return Err(CliError::Usage(format!(
+            "--poses: expected a whole number between 1 and {most}"
+        )));
+    }
     let files = labelled_files(&args.dir)?;
     let client = args.target.client_or_new()?;
     let mut report = upload_all(&client, &files, args.poses)?;

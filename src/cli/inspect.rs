@@ -3,7 +3,7 @@
 use super::files::MeshFile;
 use super::query_inputs::gather;
 use super::refused::Refused;
-use super::values::at_least_one;
+use super::values::poses;
 use super::{CliError, ParameterArgs, figures, output};
 use crate::cancel::Cancel;
 use crate::figure::{GalleryRow, RowView, as_large_as, gallery};
@@ -22,7 +22,7 @@ pub struct InspectArgs {
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
     /// Sample this many poses of an animated glTF and inspect each
-    #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
+    #[arg(long, value_name = "COUNT", value_parser = poses)]
     pub poses: Option<usize>,
     /// Draw every mesh, as read and as prepared, into one SVG file
     #[arg(long, value_name = "FILE")]

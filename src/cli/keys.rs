@@ -3,6 +3,7 @@
 use super::client::{Client, Payload, TargetArgs};
 use super::encode::encode;
 use super::{CliError, listing, output};
+use crate::model::KeyName;
 use jiff::{SignedDuration, Timestamp};
 use serde_json::{Map, Value, json};
 
@@ -99,6 +100,7 @@ fn create(args: &CreateArgs, json: bool) -> Result<(), CliError> {
             body.insert(name.to_owned(), value);
         }
     }
+    KeyName::new(&args.name).map_err(|error| CliError::Usage(format!("{}: {error}", args.name)))?;
     let made = args
         .target
         .client_or_new()?

@@ -6,7 +6,9 @@ use super::encode::encode;
 use super::listing::{self, Column, tell};
 use crate::model::SnapshotId;
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::{Path, PathBuf};
 
 /// Arguments of `snapshot`.
 #[derive(Debug, clap::Args)]
@@ -110,10 +112,28 @@ const COLUMNS: [Column; 6] = [
     (">bytes", "bytes"),
 ];
 
+/// What a snapshot's file begins with (RFC 8878).
+const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+
+/// Refuses what is no snapshot by its first bytes, before a data directory is made for it.
+fn require_zstd(file: &Path) -> Result<(), CliError> {
+    let mut first = [0; ZSTD.len()];
+    let read = File::open(file).and_then(|mut file| file.read_exact(&mut first));
+    match read {
+        Ok(()) if first == ZSTD => Ok(()),
+        Err(error) if error.kind() != ErrorKind::UnexpectedEof => Err(CliError::at(file, error)),
+        _ => Err(CliError::at(
+            file,
+            "the snapshot cannot be restored: this is no file of a snapshot",
+        )),
+    }
+}
+
 /// Restores from a file, or from a snapshot that is there. What is neither is found out before a directory is made.
 fn restore(snapshot: &str, target: &TargetArgs, as_json: bool) -> Result<(), CliError> {
     let file = PathBuf::from(snapshot);
     let restored = if file.is_file() {
+        require_zstd(&file)?;
         let client = target.client_or_new()?;
         client.send_file("/v1/snapshots/restore", "application/zstd", &file)?
     } else {

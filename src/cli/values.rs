@@ -1,5 +1,6 @@
 //! Values of flags that several commands have.
 
+use crate::mesh::Limits;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 /// A whole number of 1 or more.
@@ -10,6 +11,18 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(0) | Err(_) => Err("expected a whole number, 1 or more".to_owned()),
         Ok(number) => Ok(number),
+    }
+}
+
+/// Poses to be sampled from an animated file in this process.
+///
+/// # Errors
+/// A sentence.
+pub fn poses(text: &str) -> Result<usize, String> {
+    let most = Limits::default().max_poses;
+    match text.parse() {
+        Ok(count) if (1..=most).contains(&count) => Ok(count),
+        _ => Err(format!("expected a whole number between 1 and {most}")),
     }
 }
 

@@ -171,11 +171,38 @@ fn the_catalogue_is_listed_changed_and_learnt_again() {
             break;
         }
         catalogue(path, &at);
+        assert_eq!(
+            requests(&service.url, "get_job"),
+            2,
+            "`jobs show` and `cancel`; a job is followed, not asked for"
+        );
+        assert!(requests(&service.url, "follow_job") >= 3);
     }
     assert!(service.terminate().success());
     small_zoo(path);
     answer(path, &["index", "shapes", "--data", "d"]);
     catalogue(path, &|args| [args, &["--data", "d"]].concat());
+}
+
+/// How many requests of an operation a service has answered with success, by its own count.
+fn requests(url: &str, operation: &str) -> u64 {
+    use std::io::Read;
+    let mut stream = std::net::TcpStream::connect(url.strip_prefix("http://").unwrap()).unwrap();
+    stream
+        .write_all(b"GET /metrics HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n")
+        .unwrap();
+    let mut text = String::new();
+    stream.read_to_string(&mut text).unwrap();
+    let series = |line: &&str| {
+        line.starts_with("shapelex_http_requests_total")
+            && line.contains(&format!("operation=\"{operation}\""))
+            && line.contains("status=\"2xx\"")
+    };
+    let line = text
+        .lines()
+        .find(series)
+        .unwrap_or_else(|| panic!("no {operation} in {text}"));
+    line.rsplit(' ').next().unwrap().parse().unwrap()
 }
 
 /// Every command, at a place that holds the small zoo.

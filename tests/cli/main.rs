@@ -4,6 +4,7 @@ mod benchmark;
 mod catalogue;
 mod commands;
 mod configuration;
+mod figures;
 mod https;
 mod keys;
 mod readme;

@@ -39,12 +39,43 @@ fn a_data_directory_that_is_not_there_is_not_made_by_commands_that_read() {
         &["snapshot", "restore", "nothing.tar.zst", "--data", "typo"],
         &["serve", "--recovery-mode", "--data", "typo"],
         &["import", "nothing.safetensors", "--data", "typo"],
+        &[
+            "keys",
+            "create",
+            "no spaces",
+            "--scope",
+            "admin",
+            "--data",
+            "typo",
+        ],
+        &[
+            "keys",
+            "create",
+            "a",
+            "--scope",
+            "admin",
+            "--expires",
+            "soon",
+            "--data",
+            "typo",
+        ],
+        &[
+            "zoo",
+            "--out",
+            "z",
+            "--min-vertices",
+            "900",
+            "--max-vertices",
+            "800",
+        ],
         &["index", "nothing", "--data", "typo"],
         &["query", "x.obj"],
     ] {
         let said = fails(path, 2, args);
         assert_eq!(said.lines().count(), 1, "{args:?}: {said}");
     }
+    let said = fails(path, 1, &["snapshot", "restore", "x.obj", "--data", "typo"]);
+    assert!(said.contains("cannot be restored"), "{said}");
     assert_eq!(entries(path), ["x.obj"], "nothing was made");
     let said = fails(path, 2, &["query", "x.obj", "--data", "typo"]);
     assert!(
