@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use tempfile::TempDir;
 use tokio::sync::oneshot;
 
 /// Requests under way at the same time.
@@ -74,19 +75,7 @@ pub fn run(args: &DemoArgs, json: bool) -> Result<(), CliError> {
     let (known, unseen): (Vec<Specimen>, Vec<Specimen>) =
         specimens.into_iter().partition(|s| s.pose < training);
 
-    let temporary = match args.data {
-        Some(_) => None,
-        None => Some(tempfile::Builder::new().prefix("shapelex-demo-").tempdir()?),
-    };
-    let data = match (&args.data, &temporary) {
-        (Some(data), _) => data.clone(),
-        (None, Some(temporary)) => temporary.path().to_owned(),
-        (None, None) => return Err(CliError::Failed("no data directory".to_owned())),
-    };
-    data_dir::require_place(&data)?;
-    if args.data.is_some() && !data_dir::exists(&data) {
-        data_dir::say_made(&data);
-    }
+    let (data, _temporary) = data_directory(args)?;
     let service = Running::start(config(&data, args.listen))?;
     let url = service.url();
     eprintln!("service on {url}");
@@ -128,6 +117,19 @@ pub fn run(args: &DemoArgs, json: bool) -> Result<(), CliError> {
     } else {
         service.stop()
     }
+}
+
+/// The data directory, and what removes it in the end where it is a temporary one.
+fn data_directory(args: &DemoArgs) -> Result<(PathBuf, Option<TempDir>), CliError> {
+    let Some(data) = &args.data else {
+        let temporary = tempfile::Builder::new().prefix("shapelex-demo-").tempdir()?;
+        return Ok((temporary.path().to_owned(), Some(temporary)));
+    };
+    data_dir::require_place(data)?;
+    if !data_dir::exists(data) {
+        data_dir::say_made(data);
+    }
+    Ok((data.clone(), None))
 }
 
 /// Two thirds of the poses train, at least one, and at least one is left to be queried.

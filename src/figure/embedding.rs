@@ -38,22 +38,7 @@ pub fn embedding(title: &str, unit: &str, points: &[EmbeddedPoint]) -> Result<St
     if points.is_empty() || !finite {
         return Err(FigureError::Empty { what: "points" });
     }
-    let mut groups: Vec<String> = Vec::new();
-    for point in points {
-        if !point.group.is_empty() && !groups.contains(&point.group) {
-            groups.push(point.group.clone());
-        }
-    }
-    let middle = |pick: fn(&EmbeddedPoint) -> f64| {
-        let low = points.iter().map(pick).fold(f64::INFINITY, f64::min);
-        let high = points.iter().map(pick).fold(f64::NEG_INFINITY, f64::max);
-        (0.5 * (low + high), 0.5 * (high - low))
-    };
-    let (x, half_x) = middle(|p| p.at.0);
-    let (y, half_y) = middle(|p| p.at.1);
-    // A unit is as long across as up.
-    let half = (half_y * 1.15).max(half_x * 1.25 * PLOT.1 / PLOT.0).max(1e-12);
-    let wide = half * PLOT.0 / PLOT.1;
+    let groups = groups(points);
     let description = format!(
         "Points in a plane, near where alike: {}.",
         points
@@ -63,11 +48,7 @@ pub fn embedding(title: &str, unit: &str, points: &[EmbeddedPoint]) -> Result<St
             .collect::<Vec<_>>()
             .join("; ")
     );
-    let axis = |which: &str, range| Axis::linear(&format!("{which} axis ({unit})"), range, 6, Quantity::Real);
-    let (x, y) = (
-        axis("first", (x - wide, x + wide)),
-        axis("second", (y - half, y + half)),
-    );
+    let (x, y) = axes(points, unit);
     let named = points.len() <= NAMED;
     let longest = points
         .iter()
@@ -112,6 +93,35 @@ pub fn embedding(title: &str, unit: &str, points: &[EmbeddedPoint]) -> Result<St
                 false,
             )
         },
+    )
+}
+
+/// The groups in the order they first appear.
+fn groups(points: &[EmbeddedPoint]) -> Vec<String> {
+    let mut groups: Vec<String> = Vec::new();
+    for point in points {
+        if !point.group.is_empty() && !groups.contains(&point.group) {
+            groups.push(point.group.clone());
+        }
+    }
+    groups
+}
+
+/// Axes that hold all points with some room, a unit as long across as up.
+fn axes(points: &[EmbeddedPoint], unit: &str) -> (Axis, Axis) {
+    let middle = |pick: fn(&EmbeddedPoint) -> f64| {
+        let low = points.iter().map(pick).fold(f64::INFINITY, f64::min);
+        let high = points.iter().map(pick).fold(f64::NEG_INFINITY, f64::max);
+        (0.5 * (low + high), 0.5 * (high - low))
+    };
+    let (x, half_x) = middle(|p| p.at.0);
+    let (y, half_y) = middle(|p| p.at.1);
+    let half = (half_y * 1.15).max(half_x * 1.25 * PLOT.1 / PLOT.0).max(1e-12);
+    let wide = half * PLOT.0 / PLOT.1;
+    let axis = |which: &str, range| Axis::linear(&format!("{which} axis ({unit})"), range, 6, Quantity::Real);
+    (
+        axis("first", (x - wide, x + wide)),
+        axis("second", (y - half, y + half)),
     )
 }
 
