@@ -321,6 +321,10 @@ mod tests {
         assert!((dot(&cross(&rows[0], &rows[1]), &rows[2]) - 1.0).abs() < 1e-12);
     }
 
+    fn covers(mut triangles: impl Iterator<Item = [Vector; 3]>, x: f64, y: f64) -> bool {
+        triangles.any(|corners| height_at(&corners, x, y).is_some())
+    }
+
     /// A wavy, closed surface of revolution with slivers among its triangles.
     fn vase() -> TriMesh {
         let (rings, around) = (60u32, 37u32);
@@ -359,9 +363,6 @@ mod tests {
             .iter()
             .map(|face| face.map(|v| frame.see(&mesh.vertices()[v as usize])))
             .collect();
-        let covers = |triangles: &mut dyn Iterator<Item = [Vector; 3]>, x: f64, y: f64| {
-            triangles.any(|corners| height_at(&corners, x, y).is_some())
-        };
         let lifted = |f: &Facet| f.corners.map(|[x, y]| [x, y, 0.0]);
         let mut inside = 0;
         for i in 0..120 {
@@ -370,9 +371,9 @@ mod tests {
                     -1.3 + 2.6 * (f64::from(i) + 0.37) / 120.0,
                     -1.3 + 2.6 * (f64::from(j) + 0.41) / 120.0,
                 );
-                if covers(&mut all.iter().copied(), x, y) {
+                if covers(all.iter().copied(), x, y) {
                     inside += 1;
-                    assert!(covers(&mut shown.iter().map(lifted), x, y), "a hole at {x}, {y}");
+                    assert!(covers(shown.iter().map(lifted), x, y), "a hole at {x}, {y}");
                 }
             }
         }

@@ -11,7 +11,7 @@ use shapelex::figure::{
     precision_recall,
 };
 use shapelex::sample::{ZooOptions, species};
-use svg::{nothing_is_cut, says, well_formed};
+use svg::{nothing_is_cut, says};
 
 pub fn names(list: &[&str]) -> Vec<String> {
     list.iter().map(|&s| s.to_owned()).collect()
