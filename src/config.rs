@@ -10,6 +10,7 @@ use crate::model::KeyLimits;
 use crate::parameters::Preset;
 use crate::store::StoreOptions;
 use crate::telemetry::LogFormat;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::{Deserialize, Serialize};
 use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -52,6 +53,34 @@ pub enum ConfigError {
     },
 }
 
+impl ConfigError {
+    /// The setting it is about, as the file spells it.
+    pub fn name(&self) -> Option<&'static str> {
+        match self {
+            Self::OutOfRange { name, .. } => Some(name),
+            _ => None,
+        }
+    }
+
+    /// The same about a value that a file has, with its line.
+    #[must_use]
+    pub fn in_file(self, path: &Path) -> Self {
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        let is_about = |line: &str| {
+            let key = line.split_once('=').map(|(key, _)| key.trim());
+            key.is_some() && key == self.name()
+        };
+        let reason = match text.lines().position(is_about) {
+            Some(line) => format!("line {}: {self}", line + 1),
+            None => self.to_string(),
+        };
+        Self::Invalid {
+            path: path.to_owned(),
+            reason,
+        }
+    }
+}
+
 macro_rules! settings {
     ($($(#[doc = $help:literal])+ $field:ident : $type:ty = $default:expr, $env:literal, $value:literal $(, $extra:ident = $setting:expr)*;)*) => {
         /// Settings of one source; `None` where it is silent.
@@ -79,6 +108,14 @@ macro_rules! settings {
             #[must_use]
             pub fn or(self, weaker: Self) -> Self {
                 Self { $($field: self.$field.or(weaker.$field),)* }
+            }
+
+            /// Whether this source has the setting of that name.
+            pub fn has(&self, name: &str) -> bool {
+                match name {
+                    $(stringify!($field) => self.$field.is_some(),)*
+                    _ => false,
+                }
             }
 
             /// These settings, and where they are silent the defaults.
@@ -135,7 +172,7 @@ settings! {
     /// How log lines are written
     log_format: LogFormat = LogFormat::Text, "SHAPELEX_LOG_FORMAT", "FORMAT";
     /// Preset the first reindex starts from, where it names none
-    preset: Preset = Preset::Default, "SHAPELEX_PRESET", "PRESET", value_parser = parse_preset;
+    preset: Preset = Preset::Default, "SHAPELEX_PRESET", "PRESET", value_parser = preset_values();
     /// Longest request body, in MiB
     max_body_mib: usize = 128, "SHAPELEX_MAX_BODY_MIB", "MIB";
     /// Files in one upload, or members of its archive, at most
@@ -197,13 +234,18 @@ impl Settings {
     }
 }
 
-/// A preset by its name.
-///
-/// # Errors
-/// A sentence with the names there are.
-pub fn parse_preset(text: &str) -> Result<Preset, String> {
-    serde_json::from_value(serde_json::Value::String(text.to_owned()))
-        .map_err(|_| "expected default, paper, robust or fast".to_owned())
+/// The presets by their names, which the help lists.
+pub fn preset_values() -> impl TypedValueParser<Value = Preset> {
+    let name = |preset: Preset| match preset {
+        Preset::Default => "default",
+        Preset::Paper => "paper",
+        Preset::Robust => "robust",
+        Preset::Fast => "fast",
+    };
+    PossibleValuesParser::new(Preset::ALL.map(name)).try_map(move |text| {
+        let found = Preset::ALL.into_iter().find(|&preset| name(preset) == text);
+        found.ok_or("there is no such preset")
+    })
 }
 
 fn given(path: &Path) -> Option<PathBuf> {
@@ -235,8 +277,13 @@ fn one_line(error: &toml::de::Error, text: &str) -> String {
     let message = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
     match error.span() {
         Some(span) => {
-            let line = text.bytes().take(span.start).filter(|&b| b == b'\n').count() + 1;
-            format!("line {line}: {message}")
+            let line = text.bytes().take(span.start).filter(|&b| b == b'\n').count();
+            let written = text.lines().nth(line).unwrap_or_default();
+            // An unknown key is named by the message; a wrong value is not told whose it is.
+            let key = written.split_once('=').map(|(key, _)| key.trim());
+            let key = key.filter(|key| !message.contains(&format!("`{key}`")));
+            let key = key.map(|key| format!("{key}: ")).unwrap_or_default();
+            format!("line {}: {key}{message}", line + 1)
         }
         None => message,
     }
@@ -395,7 +442,10 @@ mod tests {
         assert!(error.contains("listen"), "names what there is: {error}");
         let kind = file("job_queue = \"many\"\n");
         let error = Settings::from_file(kind.path()).unwrap_err().to_string();
-        assert!(error.contains("line 1") && !error.contains('\n'), "{error}");
+        assert!(
+            error.contains("line 1: job_queue: ") && !error.contains('\n'),
+            "{error}"
+        );
         assert!(Settings::from_file(Path::new("/nowhere/shapelex.toml")).is_err());
     }
 
@@ -407,5 +457,12 @@ mod tests {
         };
         let error = settings.resolve().unwrap_err().to_string();
         assert_eq!(error, "max_vertices must be 1 or more, got 0");
+        let file = file("job_queue = 7\n\nmax_vertices = 0\n");
+        let error = Settings::from_file(file.path()).unwrap().resolve().unwrap_err();
+        let said = error.in_file(file.path()).to_string();
+        assert!(
+            said.contains("line 3: max_vertices must be 1 or more, got 0"),
+            "{said}"
+        );
     }
 }

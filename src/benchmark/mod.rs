@@ -15,9 +15,9 @@ pub mod specimen;
 pub mod unit;
 
 pub use evaluate::{Evaluation, LabelledShape, QueryResult, evaluate};
-pub use measures::RetrievalMeasures;
+pub use measures::{RetrievalMeasures, wilson};
 pub use method::Method;
-pub use open_set::{OpenSet, Share, evaluate_open_set};
+pub use open_set::{AtLevel, OpenSet, Share, evaluate_open_set};
 pub use protocol::{Protocol, Round, rounds};
 pub use report::BenchmarkReport;
 pub use robustness::{Category, Member, Robustness, robustness_rounds};

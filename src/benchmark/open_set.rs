@@ -39,6 +39,18 @@ impl Share {
     }
 }
 
+/// Levels that the sets of possible classes are tried at, beside the one that counts.
+const LEVELS: [f64; 9] = [0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5];
+
+/// What came of an open-set evaluation at one level.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct AtLevel {
+    /// A class is possible while its p-value is above this.
+    pub level: f64,
+    /// Queries of indexed classes whose set of possible classes holds the true one; 1 − level of them is promised.
+    pub covered: Share,
+}
+
 /// What came of an open-set evaluation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct OpenSet {
@@ -52,6 +64,8 @@ pub struct OpenSet {
     pub refused_by_class: BTreeMap<String, Share>,
     /// Mean number of possible classes of a query of an indexed class.
     pub mean_set_size: f64,
+    /// Coverage at other levels, ascending.
+    pub by_level: Vec<AtLevel>,
     /// Classes left out because they have fewer than three shapes.
     pub left_out: Vec<String>,
 }
@@ -70,6 +84,11 @@ impl OpenSet {
         sum(&mut self.refused_unknown, &other.refused_unknown);
         for (class, share) in &other.refused_by_class {
             sum(self.refused_by_class.entry(class.clone()).or_default(), share);
+        }
+        self.by_level.resize(other.by_level.len(), AtLevel::default());
+        for (own, at) in self.by_level.iter_mut().zip(&other.by_level) {
+            own.level = at.level;
+            sum(&mut own.covered, &at.covered);
         }
         self.mean_set_size = (sets + other_sets) / self.covered.total.max(1) as f64;
         self.left_out.clone_from(&other.left_out);
@@ -165,6 +184,12 @@ pub fn evaluate_open_set(
         return Ok(None);
     };
     let mut result = OpenSet {
+        by_level: LEVELS
+            .map(|level| AtLevel {
+                level,
+                ..AtLevel::default()
+            })
+            .to_vec(),
         left_out,
         ..OpenSet::default()
     };
@@ -176,12 +201,16 @@ pub fn evaluate_open_set(
         }
         let truth = group(class);
         let verdict = full.judge(ranked.iter().map(|(label, score)| (label.as_str(), *score)));
-        let set: Vec<&str> = ranked
-            .iter()
-            .zip(&verdict.p_values)
-            .filter(|(_, p)| p.is_none_or(|p| p > SIGNIFICANCE))
-            .map(|((label, _), _)| label.as_str())
-            .collect();
+        let possible_at = |level: f64| -> Vec<&str> {
+            let judged = ranked.iter().zip(&verdict.p_values);
+            let kept = judged.filter(|(_, p)| p.is_none_or(|p| p > level));
+            kept.map(|((label, _), _)| label.as_str()).collect()
+        };
+        let set = possible_at(SIGNIFICANCE);
+        for at in &mut result.by_level {
+            let set = possible_at(at.level);
+            at.covered.add(set.iter().any(|label| truth.contains(*label)));
+        }
         possible += set.len();
         result.covered.add(set.iter().any(|label| truth.contains(*label)));
         result.refused_known.add(verdict.none_of_these);

@@ -2,15 +2,12 @@
 
 use super::CliError;
 use super::client::{CallError, Client, Payload};
+use super::encode::encode;
 use super::files::MeshFile;
+use super::follow::{follow, succeeded};
 use super::parameters::ParameterArgs;
-use super::progress::Progress;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
-use std::time::Duration;
-
-/// Time between two looks at a running job.
-const POLL_EVERY: Duration = Duration::from_millis(200);
 
 /// What an upload led to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,12 +66,13 @@ pub fn query(
     client.call("POST", &path, mesh_payload(file))
 }
 
-/// Starts a reindex of what is stale and follows it to its end. The answer is the job.
+/// Starts a reindex and follows it to its end. `scope` is the API's: "stale", "all" or a list of classes. The answer is
+/// the job.
 ///
 /// # Errors
 /// [`CliError::Failed`] with the job's reason where it did not succeed.
-pub fn reindex(client: &Client, parameters: &ParameterArgs) -> Result<Value, CliError> {
-    let mut request = Map::new();
+pub fn reindex(client: &Client, parameters: &ParameterArgs, scope: Value) -> Result<Value, CliError> {
+    let mut request = Map::from_iter([("scope".to_owned(), scope)]);
     if let Some(preset) = parameters.preset {
         request.insert("preset".to_owned(), json!(preset));
     }
@@ -82,51 +80,7 @@ pub fn reindex(client: &Client, parameters: &ParameterArgs) -> Result<Value, Cli
         request.insert("parameters".to_owned(), Value::Object(parameters.overrides()?));
     }
     let job = client.call("POST", "/v1/reindex", Payload::Json(Value::Object(request)))?;
-    follow(client, job)
-}
-
-fn follow(client: &Client, mut job: Value) -> Result<Value, CliError> {
-    let id = job["id"]
-        .as_str()
-        .ok_or_else(|| CliError::Failed("the service's answer names no job".to_owned()))?
-        .to_owned();
-    let mut shown: Option<(String, Progress)> = None;
-    loop {
-        for step in job["steps"].as_array().into_iter().flatten() {
-            let name = step["name"].as_str().unwrap_or("reindex");
-            let number = |key: &str| step[key].as_u64().unwrap_or(0) as usize;
-            let is_last = job["steps"].as_array().and_then(|s| s.last()) == Some(step);
-            match &shown {
-                Some((current, progress)) if current == name => {
-                    progress.set(number("finished"), number("total"))
-                }
-                _ if is_last => {
-                    if let Some((_, ended)) = shown.take() {
-                        ended.finish();
-                    }
-                    let progress = Progress::new(name, number("total"));
-                    progress.set(number("finished"), number("total"));
-                    shown = Some((name.to_owned(), progress));
-                }
-                _ => {}
-            }
-        }
-        match job["state"].as_str() {
-            Some("succeeded") => break,
-            Some("failed") => {
-                let detail = job["failure"]["detail"].as_str().unwrap_or("no reason given");
-                return Err(CliError::Failed(format!("the reindex failed: {detail}")));
-            }
-            Some("canceled") => return Err(CliError::Failed("the reindex was cancelled".to_owned())),
-            _ => {}
-        }
-        std::thread::sleep(POLL_EVERY);
-        job = client.call("GET", &format!("/v1/jobs/{id}"), Payload::Empty)?;
-    }
-    if let Some((_, progress)) = shown {
-        progress.finish();
-    }
-    Ok(job)
+    succeeded(follow(client, job)?)
 }
 
 /// A file with its buffers as multipart, a file without as it is.
@@ -157,28 +111,10 @@ fn mesh_payload(file: MeshFile) -> Payload {
     Payload::Bytes(format!("multipart/form-data; boundary={boundary}"), body)
 }
 
-/// Percent-encodes everything but RFC 3986's unreserved characters.
-pub fn encode(text: &str) -> String {
-    text.bytes().fold(String::new(), |mut encoded, byte| {
-        if byte.is_ascii_alphanumeric() || b"-._~".contains(&byte) {
-            encoded.push(char::from(byte));
-        } else {
-            // Writing to a String cannot fail.
-            let _ = write!(encoded, "%{byte:02X}");
-        }
-        encoded
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::mesh::Companion;
-
-    #[test]
-    fn names_are_encoded_for_a_path() {
-        assert_eq!(encode("great dane/ä?.obj"), "great%20dane%2F%C3%A4%3F.obj");
-    }
 
     #[test]
     fn buffers_travel_beside_their_file() {

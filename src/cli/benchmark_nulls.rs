@@ -1,7 +1,8 @@
 //! The null shapes of a benchmark: files, or creatures of the zoo.
 
 use super::CliError;
-use super::files::{MeshFile, labelled_files};
+use super::files::MeshFile;
+use super::folders::labelled_files;
 use crate::benchmark::Category;
 use crate::benchmark::protocol::natural_key;
 use crate::mesh::{Components, Limits, PrepareOptions, TriangleSoup, prepare, read};
@@ -50,6 +51,12 @@ impl Null {
 pub fn of_files(paths: &[PathBuf], vertices: usize) -> Result<Vec<Null>, CliError> {
     let mut classes: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
     for path in paths {
+        if !path.exists() {
+            return Err(CliError::Usage(format!(
+                "{}: there is no such file or folder",
+                path.display()
+            )));
+        }
         let mut found: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
         if path.is_dir() {
             for file in labelled_files(path)? {

@@ -3,8 +3,9 @@
 //! Local commands call the very routes a client calls, without a socket in between, so there is one implementation of
 //! uploading, indexing and querying.
 
-use super::CliError;
-use crate::config::{Config, DEFAULT_DATA, DEFAULT_LISTEN};
+use super::wording::{self, Place};
+use super::{CliError, data_dir, trust};
+use crate::config::{Config, DEFAULT_LISTEN};
 use crate::http::host::canonical;
 use crate::http::local_access::LocalAccess;
 use crate::http::{AppState, OpenError, router};
@@ -14,7 +15,7 @@ use axum::body::Body;
 use axum::http::{Request, Uri};
 use serde_json::Value;
 use std::net::IpAddr;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tower::ServiceExt;
 
@@ -28,55 +29,103 @@ const CLOSE_WITHIN: Duration = Duration::from_secs(30);
 pub struct TargetArgs {
     /// Data directory to work in; `keys` and `snapshot` ask the service that runs on it [default: shapelex-data]
     #[arg(long, env = "SHAPELEX_DATA", value_name = "DIR")]
-    pub data: Option<std::path::PathBuf>,
-    /// Running service to work with, such as http://127.0.0.1:7345
+    pub data: Option<PathBuf>,
+    /// Running service to work with, such as http://127.0.0.1:7345 or https://shapes.example
     #[arg(long, env = "SHAPELEX_SERVER", value_name = "URL")]
     pub server: Option<String>,
     /// API key for a running service that asks for one; the environment keeps it out of the process list
     #[arg(long, env = "SHAPELEX_API_KEY", value_name = "KEY", hide_env_values = true)]
     pub api_key: Option<String>,
+    /// Certificates (PEM) to trust a https:// service by, instead of the well-known ones
+    #[arg(long, env = "SHAPELEX_CA_CERT", value_name = "FILE")]
+    pub ca_cert: Option<PathBuf>,
 }
 
 impl TargetArgs {
-    /// Connects, or opens the data directory.
+    /// Connects, or opens the data directory, which has to be there.
+    ///
+    /// # Errors
+    /// As [`Client::remote`], [`Client::local`] and [`data_dir::require`].
+    pub fn client(&self) -> Result<Client, CliError> {
+        if self.server.is_none() {
+            data_dir::require(&data_dir::chosen(self.data.as_deref()))?;
+        }
+        self.client_or_new()
+    }
+
+    /// The same; a data directory that is not there is made, and said to be.
     ///
     /// # Errors
     /// As [`Client::remote`] and [`Client::local`].
-    pub fn client(&self) -> Result<Client, CliError> {
-        match &self.server {
-            Some(url) => Ok(Client::remote(url)?.with_key(self.api_key.clone())),
-            None => Client::local(self.data.as_deref()),
+    pub fn client_or_new(&self) -> Result<Client, CliError> {
+        if let Some(url) = &self.server {
+            return Ok(Client::remote(url, self.ca_cert.as_deref())?.with_key(self.api_key.clone()));
         }
+        let data = data_dir::chosen(self.data.as_deref());
+        data_dir::require_place(&data)?;
+        let is_new = !data_dir::exists(&data);
+        let client = Client::local(&data)?;
+        if is_new {
+            data_dir::say_made(&data);
+        }
+        Ok(client)
     }
 
     /// As [`client`](Self::client), for what only an operator may do. On a data directory that a service runs on it is
     /// that service's client. Without an API key it brings the token that the service keeps in its data directory.
     ///
     /// # Errors
-    /// As [`Client::remote`] and [`Client::local`].
+    /// As [`client`](Self::client).
     pub fn operator_client(&self) -> Result<Client, CliError> {
-        let data = self.data.as_deref().unwrap_or(Path::new(DEFAULT_DATA));
-        let access = || LocalAccess::read(data);
-        if let Some(url) = &self.server {
-            let token = || Some(access().filter(|access| same_place(&access.url, url))?.token);
-            return Ok(Client::remote(url)?.with_key(self.api_key.clone().or_else(token)));
+        if self.server.is_none() {
+            data_dir::require(&data_dir::chosen(self.data.as_deref()))?;
         }
-        let locked = match Client::open(Some(data)) {
-            Err(error @ OpenError::Store(StoreError::Locked { .. })) => error,
-            opened => return opened.map_err(|error| CliError::Failed(error.to_string())),
+        self.operator_client_or_new()
+    }
+
+    /// The same; a data directory that is not there is made, and said to be.
+    ///
+    /// # Errors
+    /// As [`client_or_new`](Self::client_or_new).
+    pub fn operator_client_or_new(&self) -> Result<Client, CliError> {
+        let data = data_dir::chosen(self.data.as_deref());
+        let access = || LocalAccess::read(&data);
+        let remote = |url: &str, token: Option<String>| {
+            let client = Client::remote(url, self.ca_cert.as_deref())?;
+            Ok(client.with_key(self.api_key.clone().or(token)))
         };
-        // One that speaks TLS only is not for this client.
-        match access().filter(|access| access.url.starts_with("http://")) {
-            None => Err(CliError::Failed(locked.to_string())),
-            Some(access) => {
-                eprintln!(
-                    "shapelex: a service runs on {}; asking it at {}",
-                    data.display(),
-                    access.url
-                );
-                Ok(Client::remote(&access.url)?.with_key(self.api_key.clone().or(Some(access.token))))
-            }
+        if let Some(url) = &self.server {
+            let access = access().filter(|access| same_place(&access.url, url));
+            return remote(url, access.map(|access| access.token));
         }
+        data_dir::require_place(&data)?;
+        let is_new = !data_dir::exists(&data);
+        let locked = match Client::open(&data) {
+            Ok(client) => {
+                if is_new {
+                    data_dir::say_made(&data);
+                }
+                return Ok(client);
+            }
+            Err(error @ OpenError::Store(StoreError::Locked { .. })) => error,
+            Err(error) => return Err(opening_failed(&error)),
+        };
+        let Some(access) = access() else {
+            return Err(opening_failed(&locked));
+        };
+        eprintln!(
+            "shapelex: a service runs on {}; asking it at {}",
+            data.display(),
+            access.url
+        );
+        remote(&access.url, Some(access.token))
+    }
+}
+
+fn opening_failed(error: &OpenError) -> CliError {
+    match error {
+        OpenError::Store(store) => data_dir::open_error(store),
+        other => CliError::Failed(other.to_string()),
     }
 }
 
@@ -121,6 +170,20 @@ pub enum CallError {
     Unreachable(String),
 }
 
+impl CallError {
+    /// The same, the service's words translated.
+    #[must_use]
+    pub(super) fn worded(self, place: &Place) -> Self {
+        match self {
+            Self::Refused { code, detail } => Self::Refused {
+                detail: wording::detail(place, &code, &detail),
+                code,
+            },
+            other => other,
+        }
+    }
+}
+
 impl From<CallError> for CliError {
     fn from(error: CallError) -> Self {
         match error {
@@ -143,24 +206,29 @@ pub(super) enum Transport {
         runtime: tokio::runtime::Runtime,
         router: Router,
         state: AppState,
+        data: PathBuf,
     },
 }
 
 impl Client {
-    /// A running service. Nothing is sent yet.
+    /// A running service, trusted by the certificates in a file, or by the well-known ones. Nothing is sent yet.
     ///
     /// # Errors
-    /// [`CliError::Usage`] where the address is not `http://…`.
-    pub fn remote(url: &str) -> Result<Self, CliError> {
+    /// [`CliError::Usage`] where the address is neither `http://…` nor `https://…`, or the file is not usable.
+    pub fn remote(url: &str, ca_cert: Option<&Path>) -> Result<Self, CliError> {
         let base = url.trim_end_matches('/').to_owned();
-        if !base.starts_with("http://") {
+        if !["http://", "https://"].iter().any(|scheme| {
+            base.strip_prefix(scheme)
+                .is_some_and(|host| !host.is_empty() && host.parse::<ureq::http::uri::Authority>().is_ok())
+        }) {
             return Err(CliError::Usage(format!(
-                "--server {url}: expected an address such as http://{DEFAULT_LISTEN}"
+                "--server {url}: expected an address such as http://{DEFAULT_LISTEN} or https://shapes.example"
             )));
         }
         let agent = ureq::Agent::config_builder()
             .http_status_as_error(false)
             .timeout_connect(Some(Duration::from_secs(10)))
+            .tls_config(trust::config(ca_cert)?)
             .build()
             .new_agent();
         Ok(Self(Transport::Remote {
@@ -168,6 +236,14 @@ impl Client {
             base,
             key: None,
         }))
+    }
+
+    /// Where it works.
+    pub(super) fn place(&self) -> Place {
+        match &self.0 {
+            Transport::Remote { base, .. } => Place::Server(base.clone()),
+            Transport::Local { data, .. } => Place::Data(data.clone()),
+        }
     }
 
     /// The same with an API key.
@@ -183,15 +259,15 @@ impl Client {
     ///
     /// # Errors
     /// [`CliError::Failed`] where the directory cannot be opened.
-    pub fn local(data: Option<&Path>) -> Result<Self, CliError> {
-        Self::open(data).map_err(|error| CliError::Failed(error.to_string()))
+    pub fn local(data: &Path) -> Result<Self, CliError> {
+        Self::open(data).map_err(|error| opening_failed(&error))
     }
 
-    fn open(data: Option<&Path>) -> Result<Self, OpenError> {
-        let mut config = Config::default();
-        if let Some(data) = data {
-            config.data = data.to_owned();
-        }
+    fn open(data: &Path) -> Result<Self, OpenError> {
+        let config = Config {
+            data: data.to_owned(),
+            ..Config::default()
+        };
         // One person waits for one answer: every core learns, and no query is cut short.
         let mut service = config.service();
         service.indexing_threads = service.query_threads;
@@ -213,6 +289,7 @@ impl Client {
             runtime,
             router,
             state,
+            data: data.to_owned(),
         }))
     }
 
@@ -230,7 +307,7 @@ impl Client {
             Payload::Bytes(content_type, bytes) => (Some(content_type), bytes),
         };
         let (status, bytes) = self.send(method, path, content_type, body)?;
-        outcome(status, &bytes)
+        outcome(status, &bytes).map_err(|error| error.worded(&self.place()))
     }
 
     fn send(

@@ -5,16 +5,18 @@ use super::demo_report::{Answer, Summary};
 use super::files::MeshFile;
 use super::progress::Progress;
 use super::zoo::{Specimen, ZooFormat, specimens, write};
-use super::{CliError, ParameterArgs, api, output, service};
+use super::{CliError, ParameterArgs, api, data_dir, output, service};
 use crate::config::Config;
 use crate::http::ServiceConfig;
 use crate::sample::ZooOptions;
 use rayon::prelude::*;
+use serde_json::json;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use tempfile::TempDir;
 use tokio::sync::oneshot;
 
 /// Requests under way at the same time.
@@ -73,19 +75,11 @@ pub fn run(args: &DemoArgs, json: bool) -> Result<(), CliError> {
     let (known, unseen): (Vec<Specimen>, Vec<Specimen>) =
         specimens.into_iter().partition(|s| s.pose < training);
 
-    let temporary = match args.data {
-        Some(_) => None,
-        None => Some(tempfile::Builder::new().prefix("shapelex-demo-").tempdir()?),
-    };
-    let data = match (&args.data, &temporary) {
-        (Some(data), _) => data.clone(),
-        (None, Some(temporary)) => temporary.path().to_owned(),
-        (None, None) => return Err(CliError::Failed("no data directory".to_owned())),
-    };
+    let (data, _temporary) = data_directory(args)?;
     let service = Running::start(config(&data, args.listen))?;
     let url = service.url();
     eprintln!("service on {url}");
-    let client = Client::remote(&url)?;
+    let client = Client::remote(&url, None)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(CONNECTIONS)
         .build()
@@ -95,7 +89,7 @@ pub fn run(args: &DemoArgs, json: bool) -> Result<(), CliError> {
     pool.install(|| upload(&client, &known))?;
     let uploaded = at.elapsed().as_secs_f64();
     let at = Instant::now();
-    api::reindex(&client, &args.parameters)?;
+    api::reindex(&client, &args.parameters, json!("stale"))?;
     let reindexed = at.elapsed().as_secs_f64();
     let at = Instant::now();
     let answers = pool.install(|| query(&client, &unseen))?;
@@ -123,6 +117,19 @@ pub fn run(args: &DemoArgs, json: bool) -> Result<(), CliError> {
     } else {
         service.stop()
     }
+}
+
+/// The data directory, and what removes it in the end where it is a temporary one.
+fn data_directory(args: &DemoArgs) -> Result<(PathBuf, Option<TempDir>), CliError> {
+    let Some(data) = &args.data else {
+        let temporary = tempfile::Builder::new().prefix("shapelex-demo-").tempdir()?;
+        return Ok((temporary.path().to_owned(), Some(temporary)));
+    };
+    data_dir::require_place(data)?;
+    if !data_dir::exists(data) {
+        data_dir::say_made(data);
+    }
+    Ok((data.clone(), None))
 }
 
 /// Two thirds of the poses train, at least one, and at least one is left to be queried.

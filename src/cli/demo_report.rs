@@ -1,6 +1,6 @@
 //! What the demo found out.
 
-use super::{output, query};
+use super::{output, query_text, verdict};
 use serde::Serialize;
 use serde_json::Value;
 use std::path::Path;
@@ -37,6 +37,10 @@ impl Answer {
     fn is_right(&self) -> bool {
         self.answered() == self.class
     }
+
+    fn is_none_of_these(&self) -> bool {
+        verdict::kind(&self.value) == verdict::Kind::NoneOfThese
+    }
 }
 
 /// The demo's last line.
@@ -54,6 +58,8 @@ pub struct Summary {
     pub correct: usize,
     /// Share of queries answered with the right class, 0 to 1.
     pub top1: f64,
+    /// Queries believed to be of none of the known classes, whatever class is nearest.
+    pub none_of_these: usize,
     /// Wrong answers.
     pub mistakes: Vec<Mistake>,
     /// Wall-clock time of the whole, in seconds.
@@ -107,6 +113,7 @@ impl Summary {
             training_poses,
             queries: answers.len(),
             correct,
+            none_of_these: answers.iter().filter(|a| a.is_none_of_these()).count(),
             top1: correct as f64 / answers.len().max(1) as f64,
             mistakes,
             seconds,
@@ -130,7 +137,7 @@ impl Summary {
             if let Some(classes) = value["classes"].as_array_mut() {
                 classes.truncate(EXAMPLE_CLASSES);
             }
-            text += &query::text(Path::new(&answer.name), &value);
+            text += &query_text::text(Path::new(&answer.name), &value);
             text += "\n\n";
         }
         if self.mistakes.is_empty() {
@@ -143,6 +150,12 @@ impl Summary {
                 .collect();
             text += &output::table(&["mistaken pose", "class", "answered"], &rows);
             text += "\n";
+        }
+        if self.none_of_these > 0 {
+            text += &format!(
+                "{} poses were believed to be of none of the known classes\n",
+                self.none_of_these
+            );
         }
         text += &format!(
             "{} classes learnt from {} poses each; {} of {} unseen poses recognised ({:.1} %) in {:.1} s\n",

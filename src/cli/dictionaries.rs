@@ -82,8 +82,19 @@ pub fn to_bytes(exported: &Exported) -> Result<Vec<u8>, CliError> {
 /// Reads a file.
 ///
 /// # Errors
-/// [`CliError::Failed`] with the path and what is wrong.
+/// [`CliError::Usage`] where there is no such file; [`CliError::Failed`] with the path and what is wrong.
 pub fn load(path: &Path) -> Result<Exported, CliError> {
+    if !path.is_file() {
+        let what = if path.is_dir() {
+            "this is a folder"
+        } else {
+            "there is no such file"
+        };
+        return Err(CliError::Usage(format!(
+            "{}: {what}; expected a file written by `shapelex export`",
+            path.display()
+        )));
+    }
     let bytes = std::fs::read(path).map_err(|error| CliError::at(path, error))?;
     from_bytes(&bytes).map_err(|reason| CliError::at(path, reason))
 }

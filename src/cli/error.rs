@@ -1,5 +1,6 @@
 //! Why a command ended early, and what it tells the shell.
 
+use super::wording;
 use crate::mesh::MeshError;
 use crate::parameters::ParameterError;
 use crate::pipeline::PipelineError;
@@ -72,13 +73,16 @@ impl CliError {
 
 impl From<PipelineError> for CliError {
     fn from(error: PipelineError) -> Self {
-        Self::Failed(error.to_string())
+        Self::Failed(match &error {
+            PipelineError::Mesh(mesh) => wording::mesh_error(mesh),
+            other => other.to_string(),
+        })
     }
 }
 
 impl From<MeshError> for CliError {
     fn from(error: MeshError) -> Self {
-        Self::Failed(error.to_string())
+        Self::Failed(wording::mesh_error(&error))
     }
 }
 

@@ -1,7 +1,7 @@
 //! `shapelex export`: the index's dictionaries as a safetensors file.
 
 use super::dictionaries::{Exported, ExportedClass, to_bytes};
-use super::{CliError, output};
+use super::{CliError, data_dir, output};
 use crate::config::DEFAULT_DATA;
 use crate::store::{Store, StoreOptions};
 use serde_json::json;
@@ -22,7 +22,8 @@ pub struct ExportArgs {
 /// Writes the current generation.
 ///
 /// # Errors
-/// [`CliError::Failed`] where there is no data directory, no index, or the file cannot be written.
+/// [`CliError::Usage`] where there is no data directory; [`CliError::Failed`] where there is no index, or the file
+/// cannot be written.
 pub fn run(args: &ExportArgs, as_json: bool) -> Result<(), CliError> {
     let exported = from_store(&args.data)?;
     let bytes = to_bytes(&exported)?;
@@ -44,16 +45,13 @@ pub fn run(args: &ExportArgs, as_json: bool) -> Result<(), CliError> {
 }
 
 fn from_store(data: &Path) -> Result<Exported, CliError> {
-    let failed = |error: crate::store::StoreError| CliError::Failed(error.to_string());
-    if !data.is_dir() {
-        // Opening would make it, and an empty directory where somebody mistyped helps nobody.
-        return Err(CliError::at(data, "there is no such data directory"));
-    }
+    let failed = |error: crate::store::StoreError| data_dir::open_error(&error);
+    data_dir::require(data)?;
     let store = Store::open(data, &StoreOptions::default()).map_err(failed)?;
     let generation = store
         .generation()
         .map_err(failed)?
-        .ok_or_else(|| CliError::at(data, "nothing is indexed yet; run index first"))?;
+        .ok_or_else(|| CliError::at(data, "nothing is indexed yet; run `shapelex index DIR` first"))?;
     let mut index = store.load_index(&generation).map_err(failed)?;
     let mut classes = Vec::new();
     for (indexed, learnt) in index.classes.iter_mut().zip(&generation.classes) {

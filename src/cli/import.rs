@@ -1,7 +1,7 @@
 //! `shapelex import`: a file of dictionaries → the index of a data directory.
 
 use super::dictionaries::{Exported, load};
-use super::{CliError, output};
+use super::{CliError, data_dir, output};
 use crate::config::DEFAULT_DATA;
 use crate::model::{ClassName, Generation, GenerationClass};
 use crate::pipeline::ModelReport;
@@ -33,7 +33,12 @@ pub fn run(args: &ImportArgs, as_json: bool) -> Result<(), CliError> {
         .map(|class| ClassName::new(&class.name))
         .collect::<Result<Vec<_>, _>>()
         .map_err(|error| CliError::at(&args.file, error))?;
-    let number = into_store(args, &exported, names).map_err(|error| CliError::Failed(error.to_string()))?;
+    data_dir::require_place(&args.data)?;
+    let is_new = !data_dir::exists(&args.data);
+    let number = into_store(args, &exported, names).map_err(|error| data_dir::open_error(&error))?;
+    if is_new {
+        data_dir::say_made(&args.data);
+    }
     if as_json {
         output::json(&json!({ "generation": number, "classes": exported.classes }))
     } else {

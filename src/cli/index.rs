@@ -1,14 +1,17 @@
 //! `shapelex index`: a folder per class → a learnt index.
 
 use super::client::{CallError, Client, TargetArgs};
-use super::files::{LabelledFile, MeshFile, labelled_files};
+use super::confirm::ConfirmArgs;
+use super::files::MeshFile;
+use super::folders::{LabelledFile, labelled_files};
 use super::progress::Progress;
 use super::refused::Refused;
-use super::{CliError, ParameterArgs, api, output};
+use super::values::at_least_one;
+use super::{CliError, ParameterArgs, api, output, prune, reindex};
 use crate::mesh::Limits;
 use rayon::prelude::*;
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -19,25 +22,31 @@ const UPLOADS: usize = 4;
 /// Arguments of `index`.
 #[derive(Debug, clap::Args)]
 pub struct IndexArgs {
-    /// Folder with a folder per class; a file in DIR itself is a class of its own
+    /// Folder with a folder per class, which may have subfolders; a file in DIR itself is a class of its own
     #[arg(value_name = "DIR")]
     pub dir: PathBuf,
     /// Where the index is.
     #[command(flatten)]
     pub target: TargetArgs,
     /// Sample this many poses of every animated glTF; other files count once
-    #[arg(long, value_name = "COUNT")]
+    #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
     pub poses: Option<usize>,
-    /// Learn from the files that could be read even where others could not
+    /// Learn from the files that could be read even where others could not; the exit code is 1 then all the same
     #[arg(long)]
     pub keep_going: bool,
+    /// Delete shapes and classes that are in the index but no longer in DIR; they are listed first
+    #[arg(long)]
+    pub prune: bool,
+    /// Whether it is asked before.
+    #[command(flatten)]
+    pub confirm: ConfirmArgs,
     /// The method's parameters.
     #[command(flatten)]
     pub parameters: ParameterArgs,
 }
 
 /// What indexing led to.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 struct Report {
     /// Shapes added by class.
     added: BTreeMap<String, usize>,
@@ -45,6 +54,8 @@ struct Report {
     existing: usize,
     /// Files that could not be used.
     refused: Vec<Refused>,
+    /// What left the folder and was deleted, where it was asked for.
+    pruned: Option<prune::Pruned>,
     /// The reindex, as the API tells it; `null` where there was none.
     job: Value,
     /// Wall-clock time of the whole.
@@ -55,12 +66,44 @@ struct Report {
 /// `--keep-going`; what was uploaded stays, so a second run goes on from there.
 ///
 /// # Errors
-/// [`CliError::Reported`] where files were refused; [`CliError::Failed`] where the service or the learning failed.
+/// [`CliError::Usage`] before anything is done; [`CliError::Reported`] where files were refused; [`CliError::Failed`]
+/// where the service or the learning failed.
 pub fn run(args: &IndexArgs, json: bool) -> Result<(), CliError> {
     let began = Instant::now();
     args.parameters.parameters()?;
+    if args.prune {
+        args.confirm.can_ask()?;
+    }
+    // A service has a limit of its own.
+    let most = Limits::default().max_poses;
+    if args.target.server.is_none() && args.poses.is_some_and(|poses| poses > most) {
+        return Err(CliError::Usage(format!(
+            "--poses: expected a whole number between 1 and {most}"
+        )));
+    }
     let files = labelled_files(&args.dir)?;
-    let client = args.target.client()?;
+    let client = args.target.client_or_new()?;
+    let mut report = upload_all(&client, &files, args.poses)?;
+    let refused = !report.refused.is_empty();
+    let learns = !refused || (args.keep_going && report.refused.len() < files.len());
+    if args.prune && learns {
+        report.pruned = Some(prune::prune(&client, &files, args.confirm)?);
+    }
+    if learns {
+        report.job = api::reindex(&client, &args.parameters, json!("stale"))?;
+    }
+    report.seconds = began.elapsed().as_secs_f64();
+    if json {
+        output::json(&report)?;
+    } else {
+        output::line(&report.text(learns))?;
+    }
+    reindex::warn_of_failed_shapes(&report.job)?;
+    if refused { Err(CliError::Reported) } else { Ok(()) }
+}
+
+/// Uploads every file, several at a time; goes on after one that is refused.
+fn upload_all(client: &Client, files: &[LabelledFile], poses: Option<usize>) -> Result<Report, CliError> {
     let progress = Progress::new("upload", files.len());
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(UPLOADS)
@@ -70,20 +113,14 @@ pub fn run(args: &IndexArgs, json: bool) -> Result<(), CliError> {
         files
             .par_iter()
             .map(|file| {
-                let outcome = upload(&client, file, args.poses);
+                let outcome = upload(client, file, poses);
                 progress.tick();
                 outcome
             })
             .collect()
     });
     progress.finish();
-    let mut report = Report {
-        added: BTreeMap::new(),
-        existing: 0,
-        refused: Vec::new(),
-        job: Value::Null,
-        seconds: 0.0,
-    };
+    let mut report = Report::default();
     for (file, outcome) in files.iter().zip(outcomes) {
         match outcome {
             Ok(uploaded) => {
@@ -97,21 +134,7 @@ pub fn run(args: &IndexArgs, json: bool) -> Result<(), CliError> {
             }
         }
     }
-    let learns = report.refused.is_empty() || (args.keep_going && report.refused.len() < files.len());
-    if learns {
-        report.job = api::reindex(&client, &args.parameters)?;
-    }
-    report.seconds = began.elapsed().as_secs_f64();
-    if json {
-        output::json(&report)?;
-    } else {
-        output::line(&report.text(learns))?;
-    }
-    if report.refused.is_empty() || args.keep_going && learns {
-        Ok(())
-    } else {
-        Err(CliError::Reported)
-    }
+    Ok(report)
 }
 
 fn upload(client: &Client, file: &LabelledFile, poses: Option<usize>) -> Result<api::Uploaded, CliError> {
@@ -138,18 +161,15 @@ impl Report {
         if !self.refused.is_empty() {
             text += &format!("\nfiles refused: {}, see above", self.refused.len());
         }
-        if learnt {
-            let relearned = self.job["result"]["relearned"].as_array().map_or(0, Vec::len);
-            let generation = &self.job["generation"];
+        if let Some(pruned) = &self.pruned {
             text += &format!(
-                "\nclasses learnt: {relearned}; index generation {generation}, {:.1} s",
-                self.seconds
+                "\ndeleted, no longer in the folder: {} shapes, {} classes",
+                pruned.shapes.len(),
+                pruned.classes.len()
             );
-            for skipped in self.job["result"]["skipped"].as_array().into_iter().flatten() {
-                let name = skipped["class"]["name"].as_str().unwrap_or("?");
-                let reason = skipped["reason"].as_str().unwrap_or("?");
-                text += &format!("\nclass {name} was left out: {reason}");
-            }
+        }
+        if learnt {
+            text += &format!("\n{}, {:.1} s", reindex::text(&self.job), self.seconds);
         } else {
             text += "\nnothing was learnt; mend or remove the refused files, or use --keep-going";
         }

@@ -1,13 +1,16 @@
 //! `shapelex inspect`: what is read of a file, what cleaning did, how its spectrum begins.
 
 use super::files::MeshFile;
+use super::query_inputs::gather;
 use super::refused::Refused;
+use super::values::poses;
 use super::{CliError, ParameterArgs, figures, output};
 use crate::cancel::Cancel;
-use crate::figure::{GalleryRow, as_large_as, gallery};
+use crate::figure::{GalleryRow, RowView, as_large_as, gallery};
 use crate::mesh::{Format, Limits, PrepareReport, TriangleSoup, prepare, read, read_poses};
 use crate::parameters::Parameters;
 use crate::pipeline::describe_shape;
+use crate::pipeline::prepared::refined_to;
 use serde::Serialize;
 use serde_json::json;
 use std::path::PathBuf;
@@ -15,11 +18,11 @@ use std::path::PathBuf;
 /// Arguments of `inspect`.
 #[derive(Debug, clap::Args)]
 pub struct InspectArgs {
-    /// Mesh files: OBJ, glTF, GLB, PLY, STL or OFF
+    /// Mesh files (OBJ, glTF, GLB, PLY, STL or OFF), folders of such, or - for standard input
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
     /// Sample this many poses of an animated glTF and inspect each
-    #[arg(long, value_name = "COUNT")]
+    #[arg(long, value_name = "COUNT", value_parser = poses)]
     pub poses: Option<usize>,
     /// Draw every mesh, as read and as prepared, into one SVG file
     #[arg(long, value_name = "FILE")]
@@ -37,6 +40,8 @@ struct Inspection {
     pose: Option<String>,
     format: Format,
     report: PrepareReport,
+    /// Vertices the prepared mesh is refined to before its spectrum is solved for, where it is coarse.
+    refined_to: Option<usize>,
     /// The first eigenvalues, dimensionless, ascending from 0.
     eigenvalues: Vec<f64>,
     signatures: usize,
@@ -50,13 +55,18 @@ pub fn run(args: &InspectArgs, json: bool) -> Result<(), CliError> {
     let parameters = args.parameters.parameters()?;
     let mut refused = false;
     let mut drawn = args.svg.is_some().then(Vec::new);
-    for path in &args.files {
+    for input in gather(&args.files, None)? {
+        let path = &input.path;
         let file = path.display().to_string();
-        let result = MeshFile::load(path, Limits::default().max_bytes)
+        let result = input
+            .load(Limits::default().max_bytes)
             .and_then(|mesh| inspect(&file, &mesh, args.poses, &parameters, drawn.as_mut()));
         match result {
             Ok(inspections) => {
                 for inspection in inspections {
+                    for warning in &inspection.report.warnings {
+                        eprintln!("shapelex: {}: {warning}", inspection.title());
+                    }
                     if json {
                         output::json(&inspection)?;
                     } else {
@@ -115,6 +125,7 @@ fn inspect(
                     faces: prepared.faces().to_vec(),
                 };
                 rows.push(GalleryRow {
+                    view: RowView::Shared,
                     label: pose.clone().unwrap_or_else(|| mesh.name.clone()),
                     meshes: vec![Some(soup.clone()), Some(as_large_as(&soup, prepared))],
                 });
@@ -125,6 +136,7 @@ fn inspect(
                 pose,
                 format,
                 signatures: description.views.first().map_or(0, |v| v.signatures.len()),
+                refined_to: Some(refined_to(&description.report, parameters)).filter(|&to| to > 0),
                 report: description.report,
                 eigenvalues: description.eigenvalues,
             })
@@ -133,13 +145,16 @@ fn inspect(
 }
 
 impl Inspection {
-    fn text(&self) -> String {
-        let r = &self.report;
-        let name = match &self.pose {
+    fn title(&self) -> String {
+        match &self.pose {
             Some(pose) => format!("{} ({pose})", self.file),
             None => self.file.clone(),
-        };
-        let mut lines = vec![format!("{name}: {}", self.format)];
+        }
+    }
+
+    fn text(&self) -> String {
+        let r = &self.report;
+        let mut lines = vec![format!("{}: {}", self.title(), self.format)];
         let mut row = |label: &str, value: String| lines.push(format!("  {label:<12} {value}"));
         row(
             "read",
@@ -154,6 +169,9 @@ impl Inspection {
             "prepared",
             format!("{} vertices, {} faces{simplified}", r.vertices, r.faces),
         );
+        if let Some(to) = self.refined_to {
+            row("refined", format!("to about {to} vertices for its spectrum"));
+        }
         let boundary = if r.boundary_edges == 0 {
             "closed".to_owned()
         } else {
@@ -171,9 +189,6 @@ impl Inspection {
             .collect();
         row("eigenvalues", format!("{} …", eigenvalues.join(" ")));
         row("signatures", self.signatures.to_string());
-        for warning in &r.warnings {
-            row("warning", warning.clone());
-        }
         lines.join("\n")
     }
 }

@@ -1,8 +1,9 @@
 //! `shapelex keys`: who may use a service.
 
-use super::api::encode;
 use super::client::{Client, Payload, TargetArgs};
-use super::{CliError, output};
+use super::encode::encode;
+use super::{CliError, listing, output};
+use crate::model::KeyName;
 use jiff::{SignedDuration, Timestamp};
 use serde_json::{Map, Value, json};
 
@@ -99,9 +100,10 @@ fn create(args: &CreateArgs, json: bool) -> Result<(), CliError> {
             body.insert(name.to_owned(), value);
         }
     }
+    KeyName::new(&args.name).map_err(|error| CliError::Usage(format!("{}: {error}", args.name)))?;
     let made = args
         .target
-        .operator_client()?
+        .operator_client_or_new()?
         .call("POST", "/v1/keys", Payload::Json(Value::Object(body)))?;
     if json {
         return output::json(&made);
@@ -111,26 +113,15 @@ fn create(args: &CreateArgs, json: bool) -> Result<(), CliError> {
 }
 
 fn list(client: &Client, json: bool) -> Result<(), CliError> {
-    let (mut rows, mut cursor) = (Vec::new(), String::new());
-    loop {
-        let page = client.call("GET", &format!("/v1/keys?limit=1000{cursor}"), Payload::Empty)?;
-        for key in page["items"].as_array().into_iter().flatten() {
-            if json {
-                output::json(key)?;
-            } else {
-                rows.push(row(key));
-            }
-        }
-        match page["next_cursor"].as_str() {
-            Some(next) => cursor = format!("&cursor={}", encode(next)),
-            None => break,
-        }
+    let keys = listing::all(client, "/v1/keys")?;
+    if json {
+        return keys.iter().try_for_each(output::json);
     }
-    match (json, rows.is_empty()) {
-        (true, _) => Ok(()),
-        (false, true) => output::line("there are no API keys"),
-        (false, false) => output::line(&output::table(&["name", "scope", "made", "expires", "id"], &rows)),
+    if keys.is_empty() {
+        return output::line("there are no API keys");
     }
+    let rows: Vec<Vec<String>> = keys.iter().map(row).collect();
+    output::line(&output::table(&["name", "scope", "made", "expires", "id"], &rows))
 }
 
 fn row(key: &Value) -> Vec<String> {

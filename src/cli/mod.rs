@@ -10,33 +10,58 @@ pub mod benchmark_args;
 mod benchmark_cache;
 mod benchmark_nulls;
 mod benchmark_report;
+pub mod classes;
 mod client;
+mod confirm;
+mod data_dir;
 pub mod demo;
 mod demo_report;
 mod dictionaries;
+mod encode;
 mod error;
 pub mod evaluate;
+pub mod evaluate_args;
+mod evaluate_checks;
+mod evaluate_describe;
+mod evaluate_figures;
 mod evaluation_report;
+mod events;
 pub mod export;
 mod figures;
 mod files;
+mod folders;
+mod follow;
 pub mod health;
 pub mod import;
 pub mod index;
 pub mod inspect;
+pub mod jobs;
 pub mod keys;
+mod listing;
+pub mod manual;
 mod openapi;
 mod output;
 mod parameters;
+mod parse;
 mod peak_memory;
 mod process;
 mod progress;
+mod prune;
 pub mod query;
+mod query_inputs;
+mod query_summary;
+mod query_text;
 mod refused;
+pub mod reindex;
 pub mod serve;
 mod service;
+pub mod shapes;
 pub mod snapshot;
 mod transfer;
+mod trust;
+mod values;
+mod verdict;
+mod wording;
 pub mod zoo;
 
 pub use error::CliError;
@@ -44,6 +69,7 @@ pub use parameters::ParameterArgs;
 
 use crate::telemetry::{self, LogFormat};
 use clap::{Parser, Subcommand};
+use parse::ParseError;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
@@ -75,8 +101,16 @@ pub enum Command {
     Index(index::IndexArgs),
     /// Rank the classes a mesh may belong to
     Query(query::QueryArgs),
+    /// Learn again what changed, or all, with the shapes that are there
+    Reindex(reindex::ReindexArgs),
+    /// List, show, rename and delete classes
+    Classes(classes::ClassesArgs),
+    /// List, show, delete and download the shapes of a class
+    Shapes(shapes::ShapesArgs),
+    /// List, show, follow and cancel background work
+    Jobs(jobs::JobsArgs),
     /// Measure accuracy on a folder per class
-    Evaluate(evaluate::EvaluateArgs),
+    Evaluate(evaluate_args::EvaluateArgs),
     /// Measure robustness: deform null shapes, compare methods and baselines
     Benchmark(benchmark_args::BenchmarkArgs),
     /// Show what is read of a file, what cleaning did, how its spectrum begins
@@ -95,13 +129,21 @@ pub enum Command {
     Health(health::HealthArgs),
     /// Print the API's OpenAPI document
     Openapi,
+    /// Print what a shell needs to complete commands and flags
+    Completions(manual::CompletionsArgs),
+    /// Print the manual page, or write a page per command
+    Man(manual::ManArgs),
 }
 
 /// Parses the arguments, runs the command, prints its error and returns the exit code.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let cli = match Cli::try_parse_from(args) {
+    let cli = match parse::parse(args) {
         Ok(cli) => cli,
-        Err(error) => {
+        Err(ParseError::Environment(line)) => {
+            eprintln!("shapelex: {line}");
+            return ExitCode::from(error::USAGE);
+        }
+        Err(ParseError::Clap(error)) => {
             // Printing help fails only where nobody reads it.
             let _ = error.print();
             return ExitCode::from(if error.use_stderr() {
@@ -132,6 +174,10 @@ fn dispatch(cli: &Cli) -> Result<(), CliError> {
         Command::Demo(args) => demo::run(args, json),
         Command::Index(args) => index::run(args, json),
         Command::Query(args) => query::run(args, json),
+        Command::Reindex(args) => reindex::run(args, json),
+        Command::Classes(args) => classes::run(args, json),
+        Command::Shapes(args) => shapes::run(args, json),
+        Command::Jobs(args) => jobs::run(args, json),
         Command::Evaluate(args) => evaluate::run(args, json),
         Command::Benchmark(args) => benchmark::run(args, json),
         Command::Inspect(args) => inspect::run(args, json),
@@ -142,6 +188,8 @@ fn dispatch(cli: &Cli) -> Result<(), CliError> {
         Command::Snapshot(args) => snapshot::run(args, json),
         Command::Health(args) => health::run(args, json),
         Command::Openapi => openapi::run(json),
+        Command::Completions(args) => manual::completions(args),
+        Command::Man(args) => manual::man(args, json),
     }
 }
 
@@ -150,5 +198,5 @@ fn quiet_logs() -> Result<(), CliError> {
     let filter = std::env::var("SHAPELEX_LOG").unwrap_or_else(|_| "warn".to_owned());
     telemetry::init(&filter, LogFormat::Text, None)
         .map(drop)
-        .map_err(|error| CliError::Usage(error.to_string()))
+        .map_err(|error| CliError::Usage(format!("SHAPELEX_LOG: {error}")))
 }

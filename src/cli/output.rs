@@ -16,6 +16,17 @@ pub fn line(text: &str) -> Result<(), CliError> {
     Ok(())
 }
 
+/// Writes bytes to stdout as they are.
+///
+/// # Errors
+/// As [`line`].
+pub fn bytes(bytes: &[u8]) -> Result<(), CliError> {
+    let mut stdout = std::io::stdout().lock();
+    stdout.write_all(bytes)?;
+    stdout.flush()?;
+    Ok(())
+}
+
 /// Writes a value as one line of JSON to stdout.
 ///
 /// # Errors

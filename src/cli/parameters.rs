@@ -1,8 +1,8 @@
 //! The method's parameters on the command line: a preset, and single values over it.
 
 use super::CliError;
-use crate::config::parse_preset;
-use crate::parameters::{Parameters, Preset};
+use crate::config::preset_values;
+use crate::parameters::{ParameterError, Parameters, Preset};
 use serde_json::{Map, Value};
 
 /// `--preset` and `--set`.
@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 #[command(next_help_heading = "Method")]
 pub struct ParameterArgs {
     /// Named setting of all parameters
-    #[arg(long, value_name = "PRESET", value_parser = parse_preset)]
+    #[arg(long, value_name = "PRESET", value_parser = preset_values())]
     pub preset: Option<Preset>,
     /// One parameter over the preset, such as --set atoms=64; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -25,7 +25,7 @@ impl ParameterArgs {
     pub fn parameters(&self) -> Result<Parameters, CliError> {
         let parameters: Parameters = serde_json::from_value(Value::Object(self.values()?))
             .map_err(|error| CliError::Usage(format!("--set: {error}")))?;
-        parameters.validate()?;
+        parameters.validate().map_err(|error| self.blame(&error))?;
         Ok(parameters)
     }
 
@@ -39,6 +39,15 @@ impl ParameterArgs {
             .into_iter()
             .filter(|(key, _)| self.set.iter().any(|s| key_of(s) == Some(key)))
             .collect())
+    }
+
+    /// The error with the assignment it is about.
+    fn blame(&self, error: &ParameterError) -> CliError {
+        let about = self.set.iter().rev().find(|set| key_of(set) == Some(error.name));
+        CliError::Usage(match about {
+            Some(assignment) => format!("--set {assignment}: {error}"),
+            None => error.to_string(),
+        })
     }
 
     fn values(&self) -> Result<Map<String, Value>, CliError> {
@@ -80,10 +89,35 @@ fn set(values: &mut Map<String, Value>, key: &str, text: &str) -> Result<(), Cli
     }
     // A word is a word without quotes; numbers, true, false, lists and objects are JSON.
     let value = serde_json::from_str(text).unwrap_or_else(|_| Value::String(text.to_owned()));
+    let expected = expected(values, key);
     values.insert(key.to_owned(), value);
-    serde_json::from_value::<Parameters>(Value::Object(values.clone()))
-        .map_err(|error| CliError::Usage(format!("--set {key}={text}: {error}")))?;
+    serde_json::from_value::<Parameters>(Value::Object(values.clone())).map_err(|error| {
+        let reason = expected.unwrap_or_else(|| error.to_string());
+        CliError::Usage(format!("--set {key}={text}: {reason}"))
+    })?;
     Ok(())
+}
+
+/// What a number may be: its kind and, where values outside a range are refused, its range. `None` for what is no
+/// number, where the error lists the values there are.
+fn expected(values: &Map<String, Value>, key: &str) -> Option<String> {
+    let number = values.get(key).filter(|value| value.is_number())?;
+    let (kind, outside) = if number.is_f64() {
+        ("a number", Value::from(-1.0))
+    } else {
+        ("a whole number", Value::from(u32::MAX))
+    };
+    let mut tried = values.clone();
+    tried.insert(key.to_owned(), outside);
+    let range = serde_json::from_value::<Parameters>(Value::Object(tried))
+        .ok()
+        .and_then(|parameters| parameters.validate().err())
+        .filter(|error| error.name == key);
+    Some(match range {
+        Some(error) if error.expected.contains("number") => format!("expected {}", error.expected),
+        Some(error) => format!("expected {kind} {}", error.expected),
+        None => format!("expected {kind}, 0 or more"),
+    })
 }
 
 #[cfg(test)]
@@ -124,7 +158,23 @@ mod tests {
         );
         assert!(message("atoms").contains("KEY=VALUE"));
         assert!(message("atoms=many").contains("--set atoms=many"));
-        assert!(message("atoms=0").contains("atoms must be between"));
+        assert_eq!(
+            message("atoms=0"),
+            "--set atoms=0: atoms must be between 1 and 5000, got 0"
+        );
+        assert_eq!(
+            message("atoms=many"),
+            "--set atoms=many: expected a whole number between 1 and 5000"
+        );
+        assert_eq!(
+            message("lambda=much"),
+            "--set lambda=much: expected a finite number above 0"
+        );
+        assert_eq!(
+            message("samples_per_shape=-3"),
+            "--set samples_per_shape=-3: expected a whole number, 0 or more"
+        );
+        assert!(message("rank_by=best").contains("trimmed_objective"));
         assert!(message("preset=paper").contains("--preset"));
     }
 }

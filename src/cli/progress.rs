@@ -54,6 +54,26 @@ impl Progress {
         }
     }
 
+    /// Begins where stderr is a terminal; elsewhere nothing is shown.
+    pub fn at_terminal(label: &str, total: usize) -> Option<Self> {
+        std::io::stderr().is_terminal().then(|| Self::new(label, total))
+    }
+
+    /// Takes the bar off the screen while something else is printed.
+    pub fn suspended<T>(progress: Option<&Self>, print: impl FnOnce() -> T) -> T {
+        match progress.map(|p| &p.shown) {
+            Some(Shown::Bar(bar)) => bar.suspend(print),
+            _ => print(),
+        }
+    }
+
+    /// Ends without a line about the whole.
+    pub fn clear(self) {
+        if let Shown::Bar(bar) = &self.shown {
+            bar.finish_and_clear();
+        }
+    }
+
     /// One more is done. May be called from any thread.
     pub fn tick(&self) {
         match &self.shown {

@@ -2,23 +2,32 @@
 
 use super::client::{Client, TargetArgs};
 use super::files::MeshFile;
+use super::progress::Progress;
+use super::query_inputs::{Input, gather};
+use super::query_summary::Summary;
 use super::refused::Refused;
-use super::{CliError, api, dictionaries, output};
+use super::values::{at_least_one, one_of};
+use super::{CliError, api, dictionaries, output, query_text};
 use crate::cancel::Cancel;
 use crate::http::dto::parameters::QueryRankByName;
 use crate::mesh::{Limits, read};
+use crate::parameters::RankBy;
+use crate::pipeline::prepared::refined_to;
 use crate::pipeline::{describe_query, rank_top};
 use crate::ranking::Index;
-use serde::Deserialize;
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `query`.
 #[derive(Debug, clap::Args)]
 pub struct QueryArgs {
-    /// Mesh files: OBJ, glTF, GLB, PLY, STL or OFF
+    /// Mesh files (OBJ, glTF, GLB, PLY, STL or OFF), folders of such, or - for standard input; subfolders of a folder
+    /// name the classes of what is in them, and the answers are compared with them
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
+    /// What the mesh on standard input is called; an extension tells its format where its bytes do not
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
     /// Where the index is.
     #[command(flatten)]
     pub target: TargetArgs,
@@ -26,72 +35,111 @@ pub struct QueryArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["data", "server"])]
     pub dictionaries: Option<PathBuf>,
     /// How many classes are shown
-    #[arg(long, value_name = "COUNT", default_value_t = 5)]
+    #[arg(long, value_name = "COUNT", default_value_t = 5, value_parser = at_least_one)]
     pub top: usize,
     /// What classes are ordered by; the index's own parameter where it is left out
-    #[arg(long, value_name = "METHOD", value_parser = rank_by)]
+    #[arg(long, value_name = "METHOD", value_parser = one_of(&RANK_BY, QueryRankByName::name))]
     pub rank_by: Option<QueryRankByName>,
 }
 
-fn rank_by(text: &str) -> Result<QueryRankByName, String> {
-    QueryRankByName::ALL
-        .into_iter()
-        .find(|name| name.name() == text)
-        .ok_or_else(|| {
-            format!(
-                "expected one of {}",
-                QueryRankByName::ALL.map(QueryRankByName::name).join(", ")
-            )
-        })
-}
+static RANK_BY: [QueryRankByName; 7] = QueryRankByName::ALL;
 
 enum Source {
     Service(Client),
-    File(Index),
+    File(Box<Index>, RankBy),
 }
 
-/// Ranks every file; goes on after one that is refused. With `--json` one line per file: the API's answer and the
-/// file's path.
+/// Ranks every mesh; goes on after one that is refused. With `--json` one line per mesh: the API's answer and the file's
+/// path. Of several meshes, and of a folder, a last line sums up.
 ///
 /// # Errors
-/// [`CliError::Reported`] where a file was refused; [`CliError::Failed`] where there is nothing to query.
+/// [`CliError::Usage`] where there is nothing to query, or nothing to query it against; [`CliError::Reported`] where a
+/// mesh was refused.
 pub fn run(args: &QueryArgs, json: bool) -> Result<(), CliError> {
-    let source = match &args.dictionaries {
-        Some(path) => Source::File(dictionaries::load(path)?.index),
-        None => Source::Service(args.target.client()?),
-    };
-    let mut refused = false;
-    for path in &args.files {
-        match source.rank(path, args.top, args.rank_by) {
-            Ok(mut answer) => {
-                if json {
-                    answer["file"] = json!(path.display().to_string());
-                    output::json(&answer)?;
-                } else {
-                    output::line(&text(path, &answer))?;
-                }
-            }
-            Err(error) => {
-                refused = true;
-                let code = error.code().map(str::to_owned);
-                let refusal = Refused::new(path, error);
-                refusal.warn();
-                if json {
-                    output::json(&json!({ "file": refusal.file, "error": refusal.reason, "code": code }))?;
-                }
+    let inputs = gather(&args.files, args.name.as_deref())?;
+    let source = source(args)?;
+    let several = inputs.len() > 1 || args.files.iter().any(|path| path.is_dir());
+    let progress = Progress::at_terminal("query", inputs.len()).filter(|_| several);
+    let mut summary = Summary::default();
+    for input in &inputs {
+        let outcome = source.rank(input, args.top, args.rank_by);
+        if let Some(progress) = &progress {
+            progress.tick();
+        }
+        Progress::suspended(progress.as_ref(), || tell(input, outcome, &mut summary, json))?;
+    }
+    if let Some(progress) = progress {
+        progress.clear();
+    }
+    if several && json {
+        output::json(&summary.json())?;
+    } else if several {
+        output::line(&summary.text())?;
+    }
+    if summary.refused > 0 {
+        Err(CliError::Reported)
+    } else {
+        Ok(())
+    }
+}
+
+/// Prints one answer, or why there is none, and counts it.
+fn tell(
+    input: &Input,
+    outcome: Result<Value, CliError>,
+    summary: &mut Summary,
+    json: bool,
+) -> Result<(), CliError> {
+    match outcome {
+        Ok(mut answer) => {
+            summary.add(&answer, input.class.as_deref());
+            answer["file"] = json!(input.path.display().to_string());
+            if json {
+                query_text::warn_once(&mut answer);
+                output::json(&answer)
+            } else {
+                query_text::warn(&input.path, &answer);
+                output::line(&query_text::text(&input.path, &answer))
             }
         }
+        Err(error) => {
+            summary.refuse();
+            let code = error.code().map(str::to_owned);
+            let refusal = Refused::new(&input.path, error);
+            refusal.warn();
+            if json {
+                output::json(&json!({ "file": refusal.file, "error": refusal.reason, "code": code }))?;
+            }
+            Ok(())
+        }
     }
-    if refused { Err(CliError::Reported) } else { Ok(()) }
+}
+
+fn source(args: &QueryArgs) -> Result<Source, CliError> {
+    let Some(path) = &args.dictionaries else {
+        return Ok(Source::Service(args.target.client()?));
+    };
+    let index = dictionaries::load(path)?.index;
+    let rank_by = match args.rank_by.map(QueryRankByName::method) {
+        None => index.parameters.rank_by,
+        Some(Ok(rank_by)) => rank_by,
+        Some(Err(_)) => {
+            return Err(CliError::Usage(
+                "--rank-by: a file of dictionaries has nothing for this method; query an index with --data or --server"
+                    .to_owned(),
+            ));
+        }
+    };
+    Ok(Source::File(Box::new(index), rank_by))
 }
 
 impl Source {
-    fn rank(&self, path: &Path, top: usize, rank_by: Option<QueryRankByName>) -> Result<Value, CliError> {
+    fn rank(&self, input: &Input, top: usize, rank_by: Option<QueryRankByName>) -> Result<Value, CliError> {
         let limits = Limits::default();
-        let file = MeshFile::load(path, limits.max_bytes)?;
+        let file = input.load(limits.max_bytes)?;
         let answer = match self {
             Self::Service(client) => api::query(client, file, Some(top), rank_by.map(QueryRankByName::name))?,
-            Self::File(index) => rank_against(index, &file, top, rank_by, &limits)?,
+            Self::File(index, rank_by) => rank_against(index, &file, top, *rank_by, &limits)?,
         };
         Ok(answer)
     }
@@ -103,19 +151,9 @@ fn rank_against(
     index: &Index,
     file: &MeshFile,
     top: usize,
-    rank_by: Option<QueryRankByName>,
+    rank_by: RankBy,
     limits: &Limits,
 ) -> Result<Value, CliError> {
-    let rank_by = match rank_by.map(QueryRankByName::method) {
-        None => index.parameters.rank_by,
-        Some(Ok(rank_by)) => rank_by,
-        Some(Err(_)) => {
-            return Err(CliError::Usage(
-                "--rank-by: a file of dictionaries has nothing for this method; query an index with --data or --server"
-                    .to_owned(),
-            ));
-        }
-    };
     let cancel = Cancel::new();
     let (format, soup) = read(&file.source(), limits)?;
     let description = describe_query(soup, &index.parameters, &cancel, &|_| ())?;
@@ -143,68 +181,16 @@ fn rank_against(
     Ok(json!({
         "name": file.name,
         "classes": classes,
-        "confidence": ranking.confidence,
+        "margin": ranking.confidence,
         "compared": ranking.compared,
         "pruned": ranking.pruned,
         "signatures": ranking.signatures,
         "format": format,
         "warnings": description.report.warnings,
         "mesh": description.report,
+        "refined_to": Some(refined_to(&description.report, &index.parameters)).filter(|&to| to > 0),
         "eigenvalues": description.eigenvalues,
         "rank_by": rank_by,
         "parameters": index.parameters,
     }))
-}
-
-#[derive(Deserialize)]
-struct Row {
-    rank: usize,
-    class: RowClass,
-    score: f64,
-    /// Only sparse coding knows these two.
-    relative_error: Option<f64>,
-    mean_nonzeros: Option<f64>,
-    margin: Option<f64>,
-}
-
-#[derive(Deserialize)]
-struct RowClass {
-    name: String,
-}
-
-/// The ranked table of one answer.
-pub fn text(path: &Path, answer: &Value) -> String {
-    let rows: Vec<Vec<String>> = answer["classes"]
-        .as_array()
-        .into_iter()
-        .flatten()
-        .filter_map(|row| Row::deserialize(row).ok())
-        .map(|row| {
-            vec![
-                row.rank.to_string(),
-                row.class.name,
-                format!("{:.5}", row.score),
-                row.relative_error.map_or(String::new(), |e| format!("{e:.4}")),
-                row.mean_nonzeros.map_or(String::new(), |n| format!("{n:.2}")),
-                row.margin
-                    .map_or(String::new(), |m| format!("{:.2} %", 100.0 * m)),
-            ]
-        })
-        .collect();
-    let mut text = format!("{}\n", path.display());
-    text += &output::table(
-        &[
-            ">rank",
-            "class",
-            ">score",
-            ">relative error",
-            ">non-zeros",
-            ">margin to next",
-        ],
-        &rows,
-    );
-    for warning in answer["warnings"].as_array().into_iter().flatten() {
-        text += &format!("\nwarning: {}", warning.as_str().unwrap_or_default());
-    }
-    text
 }

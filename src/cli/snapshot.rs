@@ -1,9 +1,14 @@
 //! `shapelex snapshot`: everything a service holds, as one file, and back.
 
-use super::client::{Client, Payload, TargetArgs};
-use super::{CliError, output};
+use super::CliError;
+use super::client::{Payload, TargetArgs};
+use super::encode::encode;
+use super::listing::{self, Column, tell};
+use crate::model::SnapshotId;
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::{Path, PathBuf};
 
 /// Arguments of `snapshot`.
 #[derive(Debug, clap::Args)]
@@ -78,77 +83,82 @@ pub fn run(args: &SnapshotArgs, as_json: bool) -> Result<(), CliError> {
                 format!("snapshot {}{}", describe(&made), saved.unwrap_or_default())
             })
         }
-        SnapshotCommand::List { target } => list(&target.operator_client()?, as_json),
+        SnapshotCommand::List { target } => {
+            let snapshots = listing::all(&target.operator_client()?, "/v1/snapshots")?;
+            listing::print(&snapshots, &COLUMNS, "no snapshots", as_json)
+        }
         SnapshotCommand::Download { id, out, target } => {
             let client = target.operator_client()?;
-            let path = format!("/v1/snapshots/{}/file", super::api::encode(id));
+            let path = format!("/v1/snapshots/{}/file", encode(id));
             let bytes = client.download(&path, out)?;
             let told = json!({"file": out.display().to_string(), "bytes": bytes});
             tell(as_json, &told, || format!("{bytes} bytes in {}", out.display()))
         }
-        SnapshotCommand::Restore { snapshot, target } => {
-            let client = target.operator_client()?;
-            let file = PathBuf::from(snapshot);
-            let restored = if file.is_file() {
-                client.send_file("/v1/snapshots/restore", "application/zstd", &file)?
-            } else {
-                let path = format!("/v1/snapshots/{}/restore", super::api::encode(snapshot));
-                client.call("POST", &path, Payload::Empty)?
-            };
-            tell(as_json, &restored, || {
-                format!(
-                    "restored: {} classes, {} shapes, index generation {}, as of {}",
-                    restored["classes"],
-                    restored["shapes"],
-                    restored["generation"],
-                    text(&restored, "created_at")
-                )
-            })
-        }
+        SnapshotCommand::Restore { snapshot, target } => restore(snapshot, target, as_json),
         SnapshotCommand::Delete { id, target } => {
-            let path = format!("/v1/snapshots/{}", super::api::encode(id));
+            let path = format!("/v1/snapshots/{}", encode(id));
             target.operator_client()?.call("DELETE", &path, Payload::Empty)?;
             tell(as_json, &json!({ "deleted": id }), || format!("deleted {id}"))
         }
     }
 }
 
-fn list(client: &Client, as_json: bool) -> Result<(), CliError> {
-    let mut rows = Vec::new();
-    let mut cursor = String::new();
-    loop {
-        let page = client.call(
-            "GET",
-            &format!("/v1/snapshots?limit=1000{cursor}"),
-            Payload::Empty,
-        )?;
-        for snapshot in page["items"].as_array().into_iter().flatten() {
-            if as_json {
-                output::json(snapshot)?;
-            }
-            let cell = |name: &str| match &snapshot[name] {
-                Value::String(text) => text.clone(),
-                other => other.to_string(),
+const COLUMNS: [Column; 6] = [
+    ("id", "id"),
+    ("made", "created_at"),
+    ("origin", "origin"),
+    (">classes", "classes"),
+    (">shapes", "shapes"),
+    (">bytes", "bytes"),
+];
+
+/// What a snapshot's file begins with (RFC 8878).
+const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+
+/// Refuses what is no snapshot by its first bytes, before a data directory is made for it.
+fn require_zstd(file: &Path) -> Result<(), CliError> {
+    let mut first = [0; ZSTD.len()];
+    let read = File::open(file).and_then(|mut file| file.read_exact(&mut first));
+    match read {
+        Ok(()) if first == ZSTD => Ok(()),
+        Err(error) if error.kind() != ErrorKind::UnexpectedEof => Err(CliError::at(file, error)),
+        _ => Err(CliError::at(
+            file,
+            "the snapshot cannot be restored: this is no file of a snapshot",
+        )),
+    }
+}
+
+/// Restores from a file, or from a snapshot that is there. What is neither is found out before a directory is made.
+fn restore(snapshot: &str, target: &TargetArgs, as_json: bool) -> Result<(), CliError> {
+    let file = PathBuf::from(snapshot);
+    let restored = if file.is_file() {
+        require_zstd(&file)?;
+        let client = target.operator_client_or_new()?;
+        client.send_file("/v1/snapshots/restore", "application/zstd", &file)?
+    } else {
+        if snapshot.parse::<SnapshotId>().is_err() {
+            let what = if file.is_dir() {
+                "this is a folder"
+            } else {
+                "there is no such file"
             };
-            rows.push(
-                ["id", "created_at", "origin", "classes", "shapes", "bytes"]
-                    .map(cell)
-                    .to_vec(),
-            );
+            return Err(CliError::Usage(format!(
+                "{snapshot}: {what}, and no snapshot has such an id; `shapelex snapshot list` shows those there are"
+            )));
         }
-        match page["next_cursor"].as_str() {
-            Some(next) => cursor = format!("&cursor={}", super::api::encode(next)),
-            None => break,
-        }
-    }
-    if as_json {
-        return Ok(());
-    }
-    if rows.is_empty() {
-        return output::line("no snapshots");
-    }
-    let header = ["id", "made", "origin", ">classes", ">shapes", ">bytes"];
-    output::line(&output::table(&header, &rows))
+        let path = format!("/v1/snapshots/{}/restore", encode(snapshot));
+        target.operator_client()?.call("POST", &path, Payload::Empty)?
+    };
+    tell(as_json, &restored, || {
+        format!(
+            "restored: {} classes, {} shapes, index generation {}, as of {}",
+            restored["classes"],
+            restored["shapes"],
+            restored["generation"],
+            text(&restored, "created_at")
+        )
+    })
 }
 
 fn describe(snapshot: &Value) -> String {
@@ -163,12 +173,4 @@ fn describe(snapshot: &Value) -> String {
 
 fn text<'a>(value: &'a Value, name: &str) -> &'a str {
     value[name].as_str().unwrap_or_default()
-}
-
-fn tell(as_json: bool, value: &Value, line: impl FnOnce() -> String) -> Result<(), CliError> {
-    if as_json {
-        output::json(value)
-    } else {
-        output::line(&line())
-    }
 }

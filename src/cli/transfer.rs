@@ -15,7 +15,7 @@ use tower::ServiceExt;
 const MAX_ANSWER_BYTES: u64 = 1 << 20;
 const PIECE: usize = 256 << 10;
 
-fn unreachable(error: impl std::fmt::Display) -> CallError {
+pub(super) fn unreachable(error: impl std::fmt::Display) -> CallError {
     CallError::Unreachable(error.to_string())
 }
 
@@ -57,7 +57,7 @@ impl Client {
                 Ok::<_, CallError>((status, bytes.map_err(unreachable)?.to_vec()))
             })?,
         };
-        Ok(outcome(status, &bytes)?)
+        Ok(outcome(status, &bytes).map_err(|error| error.worded(&self.place()))?)
     }
 
     /// Saves what a GET answers with: all of it, or nothing at the file's place. Returns its length.
@@ -81,7 +81,7 @@ impl Client {
                 if status != 200 {
                     let body = response.body_mut().with_config().limit(MAX_ANSWER_BYTES);
                     let bytes = body.read_to_vec().map_err(unreachable)?;
-                    return Err(refusal(status, &bytes));
+                    return Err(self.refusal(status, &bytes));
                 }
                 let mut body = BufReader::with_capacity(PIECE, response.body_mut().as_reader());
                 let mut piece = vec![0_u8; PIECE];
@@ -104,7 +104,7 @@ impl Client {
                 let status = response.status().as_u16();
                 if status != 200 {
                     let bytes = axum::body::to_bytes(response.into_body(), MAX_ANSWER_BYTES as usize).await;
-                    return Err(refusal(status, &bytes.map_err(unreachable)?));
+                    return Err(self.refusal(status, &bytes.map_err(unreachable)?));
                 }
                 let mut body = response.into_body().into_data_stream();
                 let mut length = 0;
@@ -120,18 +120,21 @@ impl Client {
         file.persist(to).map_err(|error| at(error.error))?;
         Ok(length)
     }
-}
 
-fn authorized(request: ureq::http::request::Builder, key: Option<&str>) -> ureq::http::request::Builder {
-    match key {
-        Some(key) => request.header("authorization", format!("Bearer {key}")),
-        None => request,
+    fn refusal(&self, status: u16, bytes: &[u8]) -> CliError {
+        match outcome(status, bytes) {
+            Ok(_) => CliError::Failed(format!("the service answered with status {status}")),
+            Err(error) => error.worded(&self.place()).into(),
+        }
     }
 }
 
-fn refusal(status: u16, bytes: &[u8]) -> CliError {
-    match outcome(status, bytes) {
-        Ok(_) => CliError::Failed(format!("the service answered with status {status}")),
-        Err(error) => error.into(),
+pub(super) fn authorized(
+    request: ureq::http::request::Builder,
+    key: Option<&str>,
+) -> ureq::http::request::Builder {
+    match key {
+        Some(key) => request.header("authorization", format!("Bearer {key}")),
+        None => request,
     }
 }

@@ -117,6 +117,12 @@ pub fn run(args: &ZooArgs, as_json: bool) -> Result<(), CliError> {
             "--classes and --poses must be 1 or more".to_owned(),
         ));
     }
+    if args.min_vertices > args.max_vertices {
+        return Err(CliError::Usage(format!(
+            "--min-vertices {} is more than --max-vertices {}",
+            args.min_vertices, args.max_vertices
+        )));
+    }
     let options = ZooOptions {
         min_vertices: args.min_vertices,
         max_vertices: args.max_vertices,

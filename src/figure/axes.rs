@@ -1,13 +1,11 @@
 //! Axes, marks and legends, which the charts share.
 
 use super::FigureError;
-use super::canvas::{self, Area, font, px, size, stroke};
+use super::canvas::{self, Area, font, px, upwards};
+use super::extent::{text_width, widest};
 use super::palette::{FAINT, INK, series};
-use plotters::chart::ChartContext;
-use plotters::coord::cartesian::Cartesian2d;
-use plotters::coord::ranged1d::{Ranged, ValueFormatter};
+use super::ticks::{Quantity, Tick, linear, logarithmic};
 use plotters::element::{PathElement, Polygon};
-use plotters::prelude::SVGBackend;
 use plotters::style::Color;
 use plotters::style::text_anchor::{HPos, VPos};
 
@@ -15,47 +13,134 @@ use plotters::style::text_anchor::{HPos, VPos};
 const MARK: f64 = 4.0;
 /// Distance of two lines of a legend, in pixels.
 const LEGEND_LINE: f64 = 20.0;
+/// Sizes of the texts, in pixels.
+const TICK: f64 = 12.0;
+const TITLE: f64 = 13.0;
+const LEGEND: f64 = 12.5;
+/// Length of a legend's line with the gap to its text, in pixels.
+const LEGEND_SAMPLE: f64 = 34.0;
 
-/// One axis of a chart.
-pub(super) struct Axis<'a> {
-    /// What is measured, with its unit.
-    pub label: &'a str,
-    /// Ticks aimed at.
-    pub ticks: usize,
-    /// How a value is written.
-    pub format: &'a dyn Fn(&f64) -> String,
+/// How values become places.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scale {
+    Linear,
+    Logarithmic,
 }
 
-/// Draws grid, axes, ticks and the axes' labels.
-pub(super) fn mesh<X, Y>(
-    chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>,
-    x: &Axis<'_>,
-    y: &Axis<'_>,
-) -> Result<(), FigureError>
-where
-    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
-    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
-{
-    let text = font(12.0, INK, HPos::Center, VPos::Center);
-    let mut style = chart.configure_mesh();
-    style
-        .bold_line_style(stroke(0.75, FAINT))
-        .light_line_style(FAINT.mix(0.0))
-        .axis_style(stroke(1.0, INK))
-        .set_all_tick_mark_size(size(4.0))
-        .label_style(text.clone())
-        .axis_desc_style(font(13.0, INK, HPos::Center, VPos::Center))
-        .x_labels(x.ticks)
-        .y_labels(y.ticks)
-        .x_label_formatter(x.format)
-        .y_label_formatter(y.format);
-    if !x.label.is_empty() {
-        style.x_desc(x.label);
+/// One axis of a chart.
+#[derive(Clone, Debug)]
+pub(super) struct Axis {
+    label: String,
+    range: (f64, f64),
+    scale: Scale,
+    ticks: Vec<Tick>,
+}
+
+impl Axis {
+    /// A linear axis. `label` says what is measured, with its unit; it may be empty.
+    pub(super) fn linear(label: &str, range: (f64, f64), aim: usize, quantity: Quantity) -> Self {
+        Self {
+            label: label.to_owned(),
+            range,
+            scale: Scale::Linear,
+            ticks: linear(range, aim, quantity),
+        }
     }
-    if !y.label.is_empty() {
-        style.y_desc(y.label);
+
+    /// A logarithmic axis over a range above 0.
+    pub(super) fn logarithmic(label: &str, range: (f64, f64), aim: usize) -> Self {
+        Self {
+            label: label.to_owned(),
+            range,
+            scale: Scale::Logarithmic,
+            ticks: logarithmic(range, aim),
+        }
     }
-    Ok(style.draw()?)
+
+    /// Where a value lies, 0 at the axis' beginning and 1 at its end.
+    fn share(&self, value: f64) -> f64 {
+        let (low, high) = self.range;
+        match self.scale {
+            Scale::Linear => (value - low) / (high - low),
+            Scale::Logarithmic => (value / low).ln() / (high / low).ln(),
+        }
+    }
+
+    /// Pixels that ticks and label take to the left of an upright axis.
+    pub(super) fn width(&self) -> f64 {
+        let ticks = widest(self.ticks.iter().map(|t| t.text.as_str()), TICK, 0.0);
+        ticks + 10.0 + if self.label.is_empty() { 0.0 } else { TITLE + 12.0 }
+    }
+
+    /// Pixels that ticks and label take below a level axis.
+    pub(super) fn height(&self) -> f64 {
+        TICK + 12.0 + if self.label.is_empty() { 0.0 } else { TITLE + 8.0 }
+    }
+}
+
+/// Where the data are drawn, in pixels, and what its axes say.
+#[derive(Clone, Debug)]
+pub(super) struct Plot {
+    /// Left and upper edge.
+    pub at: (f64, f64),
+    /// Width and height.
+    pub size: (f64, f64),
+    /// The level axis.
+    pub x: Axis,
+    /// The upright axis.
+    pub y: Axis,
+}
+
+impl Plot {
+    /// The place of a point, in drawn units.
+    pub(super) fn place(&self, (x, y): (f64, f64)) -> (i32, i32) {
+        let (x, y) = self.pixel((x, y));
+        (px(x), px(y))
+    }
+
+    /// The place of a point, in pixels.
+    pub(super) fn pixel(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        (
+            self.at.0 + self.size.0 * self.x.share(x),
+            self.at.1 + self.size.1 * (1.0 - self.y.share(y)),
+        )
+    }
+
+    /// Draws grid, axes, ticks and the axes' labels.
+    pub(super) fn draw(&self, area: &Area<'_>) -> Result<(), FigureError> {
+        let ((left, top), (width, height)) = (self.at, self.size);
+        let (right, bottom) = (left + width, top + height);
+        let text = font(TICK, INK, HPos::Center, VPos::Center);
+        for tick in &self.x.ticks {
+            let x = left + width * self.x.share(tick.at);
+            canvas::line(area, &[(x, top), (x, bottom)], 0.75, FAINT)?;
+            canvas::line(area, &[(x, bottom), (x, bottom + 4.0)], 1.0, INK)?;
+            canvas::write(area, &tick.text, (x, bottom + 4.0 + TICK), &text)?;
+        }
+        let text = font(TICK, INK, HPos::Right, VPos::Center);
+        for tick in &self.y.ticks {
+            let y = top + height * (1.0 - self.y.share(tick.at));
+            canvas::line(area, &[(left, y), (right, y)], 0.75, FAINT)?;
+            canvas::line(area, &[(left - 4.0, y), (left, y)], 1.0, INK)?;
+            canvas::write(area, &tick.text, (left - 7.0, y), &text)?;
+        }
+        canvas::line(area, &[(left, top), (left, bottom), (right, bottom)], 1.0, INK)?;
+        let title = font(TITLE, INK, HPos::Center, VPos::Center);
+        if !self.x.label.is_empty() {
+            let below = bottom + self.x.height() - TITLE / 2.0;
+            canvas::write(area, &self.x.label, (left + width / 2.0, below), &title)?;
+        }
+        if !self.y.label.is_empty() {
+            let beside = left - self.y.width() + TITLE / 2.0;
+            canvas::write(
+                area,
+                &self.y.label,
+                (beside, top + height / 2.0),
+                &upwards(&title),
+            )?;
+        }
+        Ok(())
+    }
 }
 
 /// Joins points given in drawn units.
@@ -65,7 +150,7 @@ pub(super) fn path(
     i: usize,
     width: f64,
 ) -> Result<(), FigureError> {
-    Ok(area.draw(&PathElement::new(points, stroke(width, series(i))))?)
+    Ok(area.draw(&PathElement::new(points, canvas::stroke(width, series(i))))?)
 }
 
 /// The mark of the i-th series at a place in drawn units: discs, squares, triangles … so that colour is not needed.
@@ -91,6 +176,11 @@ pub(super) fn mark(area: &Area<'_>, (x, y): (i32, i32), i: usize) -> Result<(), 
     Ok(area.draw(&Polygon::new(corners, series(i).filled()))?)
 }
 
+/// Pixels that a legend takes, with the gap to what stands before it.
+pub(super) fn legend_width(labels: &[String]) -> f64 {
+    36.0 + LEGEND_SAMPLE + labels.iter().map(|l| text_width(l, LEGEND)).fold(0.0, f64::max)
+}
+
 /// Names the series, one below the other from a place in pixels; `lines` where they are drawn as lines.
 pub(super) fn legend(
     area: &Area<'_>,
@@ -98,14 +188,19 @@ pub(super) fn legend(
     (x, y): (f64, f64),
     lines: bool,
 ) -> Result<(), FigureError> {
-    let text = font(12.5, INK, HPos::Left, VPos::Center);
+    let text = font(LEGEND, INK, HPos::Left, VPos::Center);
     for (i, name) in labels.iter().enumerate() {
         let y = y + LEGEND_LINE * i as f64;
         if lines {
             path(area, vec![(px(x), px(y)), (px(x + 26.0), px(y))], i, 2.0)?;
         }
         mark(area, (px(x + 13.0), px(y)), i)?;
-        canvas::write(area, &canvas::label(name), (x + 34.0, y), &text)?;
+        canvas::write(area, name, (x + LEGEND_SAMPLE, y), &text)?;
     }
     Ok(())
+}
+
+/// Height a legend needs, in pixels.
+pub(super) fn legend_height(labels: &[String]) -> f64 {
+    LEGEND_LINE * labels.len() as f64
 }

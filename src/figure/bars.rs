@@ -1,7 +1,8 @@
 //! A query's classes as ranked bars.
 
 use super::FigureError;
-use super::canvas::{self, draw, fill, font, label, number, text_width};
+use super::canvas::{self, draw, fill, font, label, number};
+use super::extent::text_width;
 use super::palette::{FAINT, INK, MUTED, series};
 use plotters::style::text_anchor::{HPos, VPos};
 

@@ -4,6 +4,7 @@
 //! positions are then exact to an eighth of a pixel.
 
 use super::FigureError;
+use super::extent::text_width;
 use super::palette::INK;
 use plotters::coord::Shift;
 use plotters::drawing::{DrawingArea, IntoDrawingArea};
@@ -15,8 +16,11 @@ use plotters::style::{Color, FontTransform, RGBColor, ShapeStyle, TextStyle, WHI
 /// Drawn units per shown pixel.
 pub(super) const UNIT: i32 = 8;
 
-/// Longest label that is drawn whole.
-const LABEL: usize = 28;
+/// Longest label that is drawn whole: the longest name a class may have.
+const LABEL: usize = 100;
+/// Size of the title and the room beside it, in pixels.
+const TITLE: f64 = 17.0;
+const BESIDE_TITLE: f64 = 16.0;
 
 /// An area to draw on.
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -31,7 +35,7 @@ pub(super) fn size(pixels: f64) -> u32 {
     px(pixels).max(0) as u32
 }
 
-/// Draws a figure of the given size in pixels. The title is drawn on top, 44 pixels high, and is the document's title
+/// Draws a figure of the given size in pixels, wider where its title needs it. The title is drawn on top, 44 pixels high, and is the document's title
 /// too; the description is there for those who hear it.
 pub(super) fn draw(
     title: &str,
@@ -39,12 +43,13 @@ pub(super) fn draw(
     (width, height): (f64, f64),
     body: impl FnOnce(&Area<'_>) -> Result<(), FigureError>,
 ) -> Result<String, FigureError> {
+    let width = width.max(text_width(title, TITLE) + 2.0 * BESIDE_TITLE).ceil();
     let mut svg = String::new();
     let drawn = (size(width), size(height));
     {
         let root = SVGBackend::with_string(&mut svg, drawn).into_drawing_area();
         root.fill(&WHITE)?;
-        let style = font(17.0, INK, HPos::Center, VPos::Center);
+        let style = font(TITLE, INK, HPos::Center, VPos::Center);
         write(&root, title, (width / 2.0, 24.0), &style)?;
         body(&root)?;
         root.present()?;
@@ -112,11 +117,6 @@ pub(super) fn line(
 /// A line style; the width is in pixels.
 pub(super) fn stroke(width: f64, colour: RGBColor) -> ShapeStyle {
     colour.stroke_width(size(width))
-}
-
-/// Rough width of a text in pixels, for layout only.
-pub(super) fn text_width(text: &str, pixels: f64) -> f64 {
-    0.56 * pixels * text.chars().count() as f64
 }
 
 /// A label short enough for its place.

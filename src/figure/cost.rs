@@ -1,10 +1,8 @@
 //! Cost over size on logarithmic axes, with the exponent of a power law.
 
-use super::axes::{Axis, legend, mark, mesh, path};
-use super::canvas::{draw, number, size};
+use super::axes::Axis;
+use super::lines::{Line, line_chart};
 use super::{FigureError, Series};
-use plotters::chart::ChartBuilder;
-use plotters::coord::combinators::IntoLogRange;
 
 /// What is measured against what, each with its unit.
 #[derive(Clone, Copy, Debug)]
@@ -61,30 +59,23 @@ pub fn cost_curves(title: &str, axes: CostAxes<'_>, series: &[Series]) -> Result
         })
         .collect();
     let description = format!("{} over {}: {}.", axes.y, axes.x, labels.join(", "));
-    draw(title, &description, (760.0, 480.0), |root| {
-        let area = root.margin(size(48.0), size(16.0), size(16.0), size(240.0));
-        let mut chart = ChartBuilder::on(&area)
-            .x_label_area_size(size(46.0))
-            .y_label_area_size(size(66.0))
-            .margin_right(size(12.0))
-            .build_cartesian_2d(
-                range(all.iter().map(|p| p.0)).log_scale(),
-                range(all.iter().map(|p| p.1)).log_scale(),
-            )?;
-        let axis = |label| Axis {
-            label,
-            ticks: 7,
-            format: &short,
-        };
-        mesh(&mut chart, &axis(axes.x), &axis(axes.y))?;
-        for (i, s) in series.iter().enumerate() {
-            let points: Vec<(i32, i32)> = positive(&s.points).map(|p| chart.backend_coord(&p)).collect();
-            path(root, points.clone(), i, 1.8)?;
-            for at in points {
-                mark(root, at, i)?;
-            }
-        }
-        legend(root, &labels, (540.0, 70.0), true)
+    let x = Axis::logarithmic(axes.x, range(all.iter().map(|p| p.0)), 7);
+    let y = Axis::logarithmic(axes.y, range(all.iter().map(|p| p.1)), 7);
+    line_chart(title, &description, (x, y), &|plot| {
+        series
+            .iter()
+            .zip(&labels)
+            .map(|(s, label)| {
+                let points: Vec<(i32, i32)> = positive(&s.points).map(|p| plot.place(p)).collect();
+                (
+                    label.clone(),
+                    Line {
+                        marks: points.clone(),
+                        points,
+                    },
+                )
+            })
+            .collect()
     })
 }
 
@@ -94,21 +85,9 @@ fn positive(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> + '_ {
 }
 
 /// From the least to the greatest value, with some room.
-fn range(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = values.fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
-    low / 1.3..high * 1.3
-}
-
-/// 200, 50k, 3M; below one as it is.
-fn short(value: &f64) -> String {
-    let tidy = |scaled: f64, unit: &str| format!("{}{unit}", (scaled * 10.0).round() / 10.0);
-    match *value {
-        v if v >= 1e9 => tidy(v / 1e9, "G"),
-        v if v >= 1e6 => tidy(v / 1e6, "M"),
-        v if v >= 1e3 => tidy(v / 1e3, "k"),
-        v if v >= 1.0 => tidy(v, ""),
-        v => number(v),
-    }
+    (low / 1.3, high * 1.3)
 }
 
 #[cfg(test)]
@@ -126,11 +105,5 @@ mod tests {
         assert!((law.factor - 3.0).abs() < 1e-9, "{law:?}");
         assert_eq!(fit_power_law(&points[..1]), None);
         assert_eq!(fit_power_law(&[(0.0, 1.0), (-1.0, 2.0), (5.0, f64::NAN)]), None);
-    }
-
-    #[test]
-    fn ticks_are_short() {
-        let texts: Vec<String> = [0.002, 0.5, 1.0, 20.0, 1000.0, 2.5e6].iter().map(short).collect();
-        assert_eq!(texts, ["0.002", "0.5", "1", "20", "1k", "2.5M"]);
     }
 }

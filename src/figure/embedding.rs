@@ -1,16 +1,21 @@
 //! Points in a plane with their names (the paper's Figure 6).
 
 use super::FigureError;
-use super::axes::{Axis, legend, mark, mesh};
-use super::canvas::{self, UNIT, draw, font, label, number, size, text_width};
+use super::axes::{Axis, Plot, legend, legend_height, legend_width, mark};
+use super::canvas::{self, UNIT, draw, font, label, number};
+use super::extent::text_width;
 use super::palette::{INK, series};
-use plotters::chart::ChartBuilder;
+use super::ticks::Quantity;
 use plotters::style::text_anchor::{HPos, VPos};
 
 /// Figures with more points name groups, not points.
 const NAMED: usize = 60;
 /// Size of a name, in pixels.
 const NAME: f64 = 12.0;
+/// Width and height of the plot, in pixels.
+const PLOT: (f64, f64) = (560.0, 440.0);
+/// Where the plot begins below the title, in pixels.
+const TOP: f64 = 56.0;
 
 /// A point with its name.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,22 +38,7 @@ pub fn embedding(title: &str, unit: &str, points: &[EmbeddedPoint]) -> Result<St
     if points.is_empty() || !finite {
         return Err(FigureError::Empty { what: "points" });
     }
-    let mut groups: Vec<String> = Vec::new();
-    for point in points {
-        if !point.group.is_empty() && !groups.contains(&point.group) {
-            groups.push(point.group.clone());
-        }
-    }
-    let middle = |pick: fn(&EmbeddedPoint) -> f64| {
-        let low = points.iter().map(pick).fold(f64::INFINITY, f64::min);
-        let high = points.iter().map(pick).fold(f64::NEG_INFINITY, f64::max);
-        (0.5 * (low + high), 0.5 * (high - low))
-    };
-    let (x, half_x) = middle(|p| p.at.0);
-    let (y, half_y) = middle(|p| p.at.1);
-    // The plot is 560 × 440 pixels; a unit is as long across as up.
-    let half = (half_y * 1.15).max(half_x * 1.25 * 440.0 / 560.0).max(1e-12);
-    let side = if groups.is_empty() { 16.0 } else { 230.0 };
+    let groups = groups(points);
     let description = format!(
         "Points in a plane, near where alike: {}.",
         points
@@ -58,35 +48,81 @@ pub fn embedding(title: &str, unit: &str, points: &[EmbeddedPoint]) -> Result<St
             .collect::<Vec<_>>()
             .join("; ")
     );
-    let width = 16.0 + 66.0 + 560.0 + side;
-    draw(title, &description, (width, 48.0 + 440.0 + 46.0 + 16.0), |root| {
-        let area = root.margin(size(48.0), size(16.0), size(16.0), size(side));
-        let wide = half * 560.0 / 440.0;
-        let mut chart = ChartBuilder::on(&area)
-            .x_label_area_size(size(46.0))
-            .y_label_area_size(size(66.0))
-            .build_cartesian_2d(x - wide..x + wide, y - half..y + half)?;
-        let format = |v: &f64| number(if v.abs() < half * 1e-9 { 0.0 } else { *v });
-        let (first, second) = (format!("first axis ({unit})"), format!("second axis ({unit})"));
-        let axis = |label| Axis {
-            label,
-            ticks: 6,
-            format: &format,
-        };
-        mesh(&mut chart, &axis(&first), &axis(&second))?;
-        let places: Vec<(i32, i32)> = points.iter().map(|p| chart.backend_coord(&p.at)).collect();
-        let kind = |p: &EmbeddedPoint| groups.iter().position(|g| *g == p.group).unwrap_or(0);
-        for (point, &at) in points.iter().zip(&places) {
-            mark(root, at, kind(point))?;
+    let (x, y) = axes(points, unit);
+    let named = points.len() <= NAMED;
+    let longest = points
+        .iter()
+        .filter(|_| named)
+        .map(|p| text_width(&label(&p.label), NAME));
+    // A name may stand on either side of a point at the edge.
+    let overhang = (longest.fold(0.0, f64::max) + 12.0 - PLOT.0 * 0.1).max(0.0);
+    let left = 16.0 + y.width().max(overhang);
+    let side = if groups.is_empty() {
+        overhang
+    } else {
+        overhang + legend_width(&groups)
+    };
+    let height = (TOP + PLOT.1 + x.height()).max(TOP + legend_height(&groups)) + 16.0;
+    let plot = Plot {
+        at: (left, TOP),
+        size: PLOT,
+        x,
+        y,
+    };
+    draw(
+        title,
+        &description,
+        (left + PLOT.0 + side + 16.0, height),
+        |root| {
+            plot.draw(root)?;
+            let places: Vec<(i32, i32)> = points.iter().map(|p| plot.place(p.at)).collect();
+            let kind = |p: &EmbeddedPoint| groups.iter().position(|g| *g == p.group).unwrap_or(0);
+            for (point, &at) in points.iter().zip(&places) {
+                mark(root, at, kind(point))?;
+            }
+            if named {
+                name_points(root, points, &places, &kind)?;
+            }
+            if groups.is_empty() {
+                return Ok(());
+            }
+            legend(
+                root,
+                &groups,
+                (left + PLOT.0 + overhang + 24.0, TOP + 12.0),
+                false,
+            )
+        },
+    )
+}
+
+/// The groups in the order they first appear.
+fn groups(points: &[EmbeddedPoint]) -> Vec<String> {
+    let mut groups: Vec<String> = Vec::new();
+    for point in points {
+        if !point.group.is_empty() && !groups.contains(&point.group) {
+            groups.push(point.group.clone());
         }
-        if points.len() <= NAMED {
-            name_points(root, points, &places, &kind)?;
-        }
-        if groups.is_empty() {
-            return Ok(());
-        }
-        legend(root, &groups, (width - side + 20.0, 66.0), false)
-    })
+    }
+    groups
+}
+
+/// Axes that hold all points with some room, a unit as long across as up.
+fn axes(points: &[EmbeddedPoint], unit: &str) -> (Axis, Axis) {
+    let middle = |pick: fn(&EmbeddedPoint) -> f64| {
+        let low = points.iter().map(pick).fold(f64::INFINITY, f64::min);
+        let high = points.iter().map(pick).fold(f64::NEG_INFINITY, f64::max);
+        (0.5 * (low + high), 0.5 * (high - low))
+    };
+    let (x, half_x) = middle(|p| p.at.0);
+    let (y, half_y) = middle(|p| p.at.1);
+    let half = (half_y * 1.15).max(half_x * 1.25 * PLOT.1 / PLOT.0).max(1e-12);
+    let wide = half * PLOT.0 / PLOT.1;
+    let axis = |which: &str, range| Axis::linear(&format!("{which} axis ({unit})"), range, 6, Quantity::Real);
+    (
+        axis("first", (x - wide, x + wide)),
+        axis("second", (y - half, y + half)),
+    )
 }
 
 /// A box in pixels: left, top, right, bottom.

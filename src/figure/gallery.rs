@@ -2,6 +2,7 @@
 
 use super::FigureError;
 use super::canvas::{self, draw, font, label, px, upwards};
+use super::extent::widest;
 use super::palette::{INK, MUTED, shaded};
 use super::render::{Frame, facets};
 use crate::mesh::{Components, MeshError, PrepareOptions, TriMesh, TriangleSoup, prepare};
@@ -14,6 +15,8 @@ const FACETS: usize = 22_000;
 /// Side of a cell in pixels, and how much of it the row's first mesh takes.
 const CELL: f64 = 132.0;
 const FILLED: f64 = 0.74;
+/// Size of the names of rows and columns, in pixels.
+const NAME: f64 = 13.0;
 /// The outside of a surface, and its inside, which is seen through holes.
 const OUTSIDE: RGBColor = RGBColor(138, 180, 222);
 const INSIDE: RGBColor = RGBColor(226, 134, 52);
@@ -25,8 +28,20 @@ const GROWN: f64 = 0.35;
 pub struct GalleryRow {
     /// What stands before the row.
     pub label: String,
-    /// One mesh per column; `None` leaves the cell empty. The view is chosen for the first and kept for the others.
+    /// One mesh per column; `None` leaves the cell empty.
     pub meshes: Vec<Option<TriangleSoup>>,
+    /// From where they are looked at.
+    pub view: RowView,
+}
+
+/// From where the meshes of a row are looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RowView {
+    /// The view and the scale of the first are kept for the others: what became of one shape.
+    #[default]
+    Shared,
+    /// Each has its own: different shapes.
+    Own,
 }
 
 /// Draws meshes by parallel projection, shaded, their inside in another colour. Within a row all have one scale, unless
@@ -57,22 +72,30 @@ pub fn gallery(title: &str, columns: &[String], rows: &[GalleryRow]) -> Result<S
         names(&mut columns.iter().map(String::as_str))
     );
     let (left, top) = (36.0, 72.0);
-    let width = left + CELL * columns.len() as f64 + 12.0;
-    let size = (width.max(300.0), top + CELL * rows.len() as f64 + 12.0);
+    // A cell is at least as large as its mesh, and as wide and high as the names along it.
+    let across = widest(columns.iter().map(String::as_str), NAME, CELL - 12.0) + 12.0;
+    let down = widest(rows.iter().map(|r| r.label.as_str()), NAME, CELL - 12.0) + 12.0;
+    let size = (
+        (left + across * columns.len() as f64 + 12.0).max(300.0),
+        top + down * rows.len() as f64 + 12.0,
+    );
     draw(title, &description, size, |root| {
-        let heading = font(13.0, INK, HPos::Center, VPos::Center);
+        let heading = font(NAME, INK, HPos::Center, VPos::Center);
         for (j, name) in columns.iter().enumerate() {
-            let x = left + CELL * (j as f64 + 0.5);
+            let x = left + across * (j as f64 + 0.5);
             canvas::write(root, &label(name), (x, top - 14.0), &heading)?;
         }
-        let side = upwards(&font(13.0, MUTED, HPos::Center, VPos::Center));
+        let side = upwards(&font(NAME, MUTED, HPos::Center, VPos::Center));
         for (i, row) in rows.iter().enumerate() {
-            let y = top + CELL * (i as f64 + 0.5);
+            let y = top + down * (i as f64 + 0.5);
             canvas::write(root, &label(&row.label), (20.0, y), &side)?;
             let mut view: Option<(Frame, f64)> = None;
             for (j, soup) in row.meshes.iter().enumerate() {
                 let Some(soup) = soup else { continue };
-                let centre = (left + CELL * (j as f64 + 0.5), y);
+                let centre = (left + across * (j as f64 + 0.5), y);
+                if row.view == RowView::Own {
+                    view = None;
+                }
                 draw_mesh(root, soup, centre, &mut view, FACETS / cells)?;
             }
         }

@@ -1,10 +1,11 @@
 //! Histograms side by side, such as the distributions of signature distances (the paper's Figure 4).
 
 use super::FigureError;
-use super::axes::{Axis, mesh};
-use super::canvas::{self, draw, font, label, number, px, size, stroke};
+use super::axes::{Axis, Plot};
+use super::canvas::{self, Area, draw, font, label, stroke};
+use super::extent::{text_width, widest};
 use super::palette::{INK, MUTED, series};
-use plotters::chart::ChartBuilder;
+use super::ticks::Quantity;
 use plotters::element::{PathElement, Polygon};
 use plotters::style::Color;
 use plotters::style::text_anchor::{HPos, VPos};
@@ -60,79 +61,27 @@ pub fn histograms(
             names.push(&other.label);
         }
     }
-    let width = (columns as f64 * PANEL.0).max(320.0) + 40.0;
+    let titles = widest(panels.iter().map(|p| p.title.as_str()), 12.5, 0.0);
+    let panel = (PANEL.0.max(titles + 20.0), PANEL.1);
+    let width = (columns as f64 * panel.0).max(320.0) + 40.0;
     let legend_lines = legend_lines(&names, width);
-    let foot = 40.0 + 20.0 * legend_lines.len() as f64;
-    let height = 48.0 + rows as f64 * PANEL.1 + foot;
-    let description = format!(
-        "Histograms of {x_label} for {}.",
-        panels
-            .iter()
-            .map(|p| p.title.as_str())
-            .collect::<Vec<_>>()
-            .join(", ")
-    );
+    let below = 48.0 + rows as f64 * panel.1;
+    let height = below + 40.0 + 20.0 * legend_lines.len() as f64;
+    let said: Vec<&str> = panels.iter().map(|p| p.title.as_str()).collect();
+    let description = format!("Histograms of {x_label} for {}.", said.join(", "));
     draw(title, &description, (width, height), |root| {
-        let percent = |v: &f64| format!("{:.0} %", 100.0 * v);
-        for (k, panel) in panels.iter().enumerate() {
-            let (row, column) = (k / columns, k % columns);
-            let (left, top) = (32.0 + column as f64 * PANEL.0, 48.0 + row as f64 * PANEL.1);
-            let place = (px(left)..px(left + PANEL.0), px(top)..px(top + PANEL.1));
-            let area = root.clone().shrink(
-                (place.0.start, place.1.start),
-                (place.0.end - place.0.start, place.1.end - place.1.start),
+        for (k, one) in panels.iter().enumerate() {
+            let at = (
+                32.0 + (k % columns) as f64 * panel.0,
+                48.0 + (k / columns) as f64 * panel.1,
             );
-            let heading = font(12.5, INK, HPos::Center, VPos::Center);
-            canvas::write(
-                root,
-                &label(&panel.title),
-                (left + PANEL.0 / 2.0 + 14.0, top + 10.0),
-                &heading,
-            )?;
-            let mut chart = ChartBuilder::on(&area)
-                .margin_top(size(20.0))
-                .margin_right(size(12.0))
-                .x_label_area_size(size(24.0))
-                .y_label_area_size(size(42.0))
-                .build_cartesian_2d(0.0..largest, 0.0..greatest * 1.05)?;
-            mesh(
-                &mut chart,
-                &Axis {
-                    label: "",
-                    ticks: 4,
-                    format: &|v| number(*v),
-                },
-                &Axis {
-                    label: "",
-                    ticks: 4,
-                    format: &percent,
-                },
-            )?;
-            let at = |x: f64, y: f64| chart.backend_coord(&(x, y));
-            let outline: Vec<(i32, i32)> = steps(&panel.main.shares, largest)
-                .map(|(x, y)| at(x, y))
-                .collect();
-            let mut filled = vec![at(0.0, 0.0)];
-            filled.extend(&outline);
-            filled.push(at(largest, 0.0));
-            root.draw(&Polygon::new(filled, series(5).mix(0.55).filled()))?;
-            root.draw(&PathElement::new(outline, stroke(1.0, series(0))))?;
-            for other in &panel.others {
-                let i = names.iter().position(|n| *n == other.label).unwrap_or(0);
-                let line: Vec<(i32, i32)> = steps(&other.shares, largest).map(|(x, y)| at(x, y)).collect();
-                root.draw(&PathElement::new(line, stroke(1.0, series(i + 1))))?;
-            }
+            draw_panel(root, one, (at, panel), (largest, greatest), &names)?;
         }
-        let below = 48.0 + rows as f64 * PANEL.1;
         let axis = font(13.0, INK, HPos::Center, VPos::Center);
         canvas::write(root, x_label, (width / 2.0, below + 16.0), &axis)?;
         let side = canvas::upwards(&axis);
-        canvas::write(
-            root,
-            "share of the pairs",
-            (16.0, 48.0 + rows as f64 * PANEL.1 / 2.0),
-            &side,
-        )?;
+        let middle = 48.0 + rows as f64 * panel.1 / 2.0;
+        canvas::write(root, "share of the pairs", (16.0, middle), &side)?;
         let text = font(12.0, MUTED, HPos::Left, VPos::Center);
         for (l, line) in legend_lines.iter().enumerate() {
             let y = below + 42.0 + 20.0 * l as f64;
@@ -143,6 +92,46 @@ pub fn histograms(
         }
         Ok(())
     })
+}
+
+/// Draws one panel into a box given by its corner and size in pixels; the axes end at `largest` and `greatest`.
+fn draw_panel(
+    root: &Area<'_>,
+    panel: &HistogramPanel,
+    ((left, top), (width, height)): ((f64, f64), (f64, f64)),
+    (largest, greatest): (f64, f64),
+    names: &[&str],
+) -> Result<(), FigureError> {
+    let heading = font(12.5, INK, HPos::Center, VPos::Center);
+    canvas::write(
+        root,
+        &label(&panel.title),
+        (left + width / 2.0 + 14.0, top + 10.0),
+        &heading,
+    )?;
+    let x = Axis::linear("", (0.0, largest), 4, Quantity::Real);
+    let y = Axis::linear("", (0.0, greatest * 1.05), 4, Quantity::Share);
+    let plot = Plot {
+        at: (left + y.width(), top + 20.0),
+        size: (width - y.width() - 12.0, height - 20.0 - x.height()),
+        x,
+        y,
+    };
+    plot.draw(root)?;
+    let outline = |histogram: &Histogram| -> Vec<(i32, i32)> {
+        steps(&histogram.shares, largest).map(|p| plot.place(p)).collect()
+    };
+    let main = outline(&panel.main);
+    let mut filled = vec![plot.place((0.0, 0.0))];
+    filled.extend(&main);
+    filled.push(plot.place((largest, 0.0)));
+    root.draw(&Polygon::new(filled, series(5).mix(0.55).filled()))?;
+    root.draw(&PathElement::new(main, stroke(1.0, series(0))))?;
+    for other in &panel.others {
+        let i = names.iter().position(|n| *n == other.label).unwrap_or(0);
+        root.draw(&PathElement::new(outline(other), stroke(1.0, series(i + 1))))?;
+    }
+    Ok(())
 }
 
 /// The outline of a histogram.
@@ -159,7 +148,7 @@ fn legend_lines(names: &[&str], width: f64) -> Vec<Vec<(f64, usize)>> {
     let mut lines: Vec<Vec<(f64, usize)>> = Vec::new();
     let mut x = f64::INFINITY;
     for (i, name) in names.iter().enumerate() {
-        let needed = 26.0 + canvas::text_width(&label(name), 12.0) + 22.0;
+        let needed = 26.0 + text_width(&label(name), 12.0) + 22.0;
         if x + needed > width - 16.0 {
             lines.push(Vec::new());
             x = 40.0;

@@ -133,12 +133,15 @@ fn feet(centred: &[Vector], up: &Vector) -> f64 {
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// The triangles that own at least one pixel, the farthest first. `resolution` is the number of pixels per unit.
+/// The triangles that own at least one pixel and those around them that face the same way, the farthest first.
+/// `resolution` is the number of pixels per unit.
+///
+/// A triangle thinner than a pixel owns none and would be missed as a slit, through which the background shines.
 pub(super) fn facets(mesh: &TriMesh, frame: &Frame, resolution: f64) -> Vec<Facet> {
     let seen: Vec<Vector> = mesh.vertices().iter().map(|p| frame.see(p)).collect();
     let open = boundary_vertices(mesh).contains(&true);
     let outward = if volume(mesh) < 0.0 { -1.0 } else { 1.0 };
-    let visible = visible(&seen, mesh.faces(), resolution);
+    let visible = with_neighbours(&seen, mesh.faces(), visible(&seen, mesh.faces(), resolution));
     let mut found: Vec<(f64, Facet)> = mesh
         .faces()
         .iter()
@@ -159,6 +162,33 @@ pub(super) fn facets(mesh: &TriMesh, frame: &Frame, resolution: f64) -> Vec<Face
         .collect();
     found.sort_by(|x, y| x.0.total_cmp(&y.0));
     found.into_iter().map(|(_, facet)| facet).collect()
+}
+
+/// Whether a triangle shows the viewer the side its corners run around counterclockwise.
+fn faces_viewer(seen: &[Vector], face: &[u32; 3]) -> bool {
+    let [a, b, c] = face.map(|v| seen[v as usize]);
+    cross(&minus(&b, &a), &minus(&c, &a))[2] >= 0.0
+}
+
+/// The visible triangles, and those that share a corner with one and face the same way.
+fn with_neighbours(seen: &[Vector], faces: &[[u32; 3]], visible: Vec<bool>) -> Vec<bool> {
+    // Per vertex: whether it belongs to a visible triangle that faces away, and towards the viewer.
+    let mut touched = vec![[false; 2]; seen.len()];
+    for (face, _) in faces.iter().zip(&visible).filter(|(_, visible)| **visible) {
+        let side = usize::from(faces_viewer(seen, face));
+        for &v in face {
+            touched[v as usize][side] = true;
+        }
+    }
+    let near = |face: &[u32; 3]| {
+        let side = usize::from(faces_viewer(seen, face));
+        face.iter().any(|&v| touched[v as usize][side])
+    };
+    faces
+        .iter()
+        .zip(visible)
+        .map(|(face, visible)| visible || near(face))
+        .collect()
 }
 
 /// Six times the enclosed volume; for an open surface its sign still tells outside from inside, mostly.
@@ -289,6 +319,65 @@ mod tests {
             }
         }
         assert!((dot(&cross(&rows[0], &rows[1]), &rows[2]) - 1.0).abs() < 1e-12);
+    }
+
+    fn covers(mut triangles: impl Iterator<Item = [Vector; 3]>, x: f64, y: f64) -> bool {
+        triangles.any(|corners| height_at(&corners, x, y).is_some())
+    }
+
+    /// A wavy, closed surface of revolution with slivers among its triangles.
+    fn vase() -> TriMesh {
+        let (rings, around) = (60u32, 37u32);
+        let mut vertices = vec![[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]];
+        for i in 1..rings {
+            let t = f64::from(i) / f64::from(rings);
+            // Rings in pairs, so that every second band is thin.
+            let z = -1.0 + 2.0 * (t - 0.4 * f64::from(i % 2) / f64::from(rings));
+            let radius = (std::f64::consts::PI * t).sin() * (1.0 + 0.3 * (9.0 * t).sin());
+            for k in 0..around {
+                let angle = std::f64::consts::TAU * f64::from(k) / f64::from(around);
+                vertices.push([radius * angle.cos(), radius * angle.sin(), z]);
+            }
+        }
+        let at = |i: u32, k: u32| 2 + (i - 1) * around + k % around;
+        let mut faces = Vec::new();
+        for k in 0..around {
+            faces.push([0, at(1, k + 1), at(1, k)]);
+            faces.push([1, at(rings - 1, k), at(rings - 1, k + 1)]);
+            for i in 1..rings - 1 {
+                faces.push([at(i, k), at(i, k + 1), at(i + 1, k)]);
+                faces.push([at(i, k + 1), at(i + 1, k + 1), at(i + 1, k)]);
+            }
+        }
+        TriMesh::new(vertices, faces, 10_000).unwrap()
+    }
+
+    #[test]
+    fn no_background_shines_through_a_closed_surface() {
+        let mesh = vase();
+        let frame = Frame::looking([0.0, 0.0, 1.0], [0.0, -1.0, 0.0]);
+        // As coarse as in a gallery: the thin bands own few pixels.
+        let shown = facets(&mesh, &frame, 25.0);
+        let all: Vec<[Vector; 3]> = mesh
+            .faces()
+            .iter()
+            .map(|face| face.map(|v| frame.see(&mesh.vertices()[v as usize])))
+            .collect();
+        let lifted = |f: &Facet| f.corners.map(|[x, y]| [x, y, 0.0]);
+        let mut inside = 0;
+        for i in 0..120 {
+            for j in 0..120 {
+                let (x, y) = (
+                    -1.3 + 2.6 * (f64::from(i) + 0.37) / 120.0,
+                    -1.3 + 2.6 * (f64::from(j) + 0.41) / 120.0,
+                );
+                if covers(all.iter().copied(), x, y) {
+                    inside += 1;
+                    assert!(covers(shown.iter().map(lifted), x, y), "a hole at {x}, {y}");
+                }
+            }
+        }
+        assert!(inside > 2000, "{inside}");
     }
 
     #[test]

@@ -1,14 +1,12 @@
 //! The figures of a robustness benchmark: the paper's Figures 3 to 6, and precision over recall.
 
 use super::{
-    EmbeddedPoint, FigureError, GalleryRow, HeatMap, Histogram, HistogramPanel, Series, as_large_as,
+    EmbeddedPoint, FigureError, GalleryRow, HeatMap, Histogram, HistogramPanel, RowView, Series, as_large_as,
     between_classes, classical_mds, embedding, gallery, heat_map, histograms, precision_recall,
 };
-use crate::benchmark::Evaluation;
 use crate::benchmark::deform::Deformation;
 use crate::benchmark::report::{BenchmarkReport, ClassMatrix, DistanceHistogram, TOTAL};
 use crate::mesh::TriangleSoup;
-use std::collections::{BTreeMap, BTreeSet};
 
 /// Rows of the gallery at most: more make each mesh coarser.
 const GALLERY_ROWS: usize = 4;
@@ -24,6 +22,16 @@ pub struct Sheet {
     pub name: String,
     /// The SVG document.
     pub svg: String,
+}
+
+impl Sheet {
+    /// A sheet of that name.
+    pub(super) fn new(name: impl Into<String>, svg: String) -> Self {
+        Self {
+            name: name.into(),
+            svg,
+        }
+    }
 }
 
 /// The paper's Figure 3: null shapes with their classes, each with its nine deformations, which `deform` makes of the
@@ -51,6 +59,7 @@ pub fn deformation_gallery(
             });
             GalleryRow {
                 label: class.to_owned(),
+                view: RowView::Shared,
                 meshes: std::iter::once(Some(null.clone())).chain(deformed).collect(),
             }
         })
@@ -77,7 +86,7 @@ pub fn benchmark_figures(report: &BenchmarkReport) -> Result<Vec<Sheet>, FigureE
         sheets.push(distance_histograms(&report.histograms)?);
     }
     if let Some(matrix) = telling_matrix(&report.dissimilarity) {
-        sheets.push(dissimilarity(&matrix)?);
+        sheets.push(dissimilarity(&matrix, "class of the deformed shapes")?);
         sheets.push(class_embedding(&matrix)?);
     }
     let curves: Vec<Series> = report
@@ -99,74 +108,6 @@ pub fn benchmark_figures(report: &BenchmarkReport) -> Result<Vec<Sheet>, FigureE
             name: "precision_recall.svg".to_owned(),
             svg: precision_recall("Retrieval of nulls and their deformations", &curves)?,
         });
-    }
-    Ok(sheets)
-}
-
-/// Three figures of an evaluation, named after its protocol: who was taken for whom, the dissimilarity of the classes,
-/// and, where every class was compared with every other, the classes in the plane.
-///
-/// # Errors
-/// The first figure's that cannot be drawn; [`FigureError::Empty`] without queries.
-pub fn evaluation_figures(evaluation: &Evaluation) -> Result<Vec<Sheet>, FigureError> {
-    let protocol = evaluation.protocol.name();
-    let classes: Vec<String> = evaluation
-        .queries
-        .iter()
-        .flat_map(|q| q.ranked.iter().map(|(class, _)| class).chain([&q.class]))
-        .collect::<BTreeSet<_>>()
-        .into_iter()
-        .cloned()
-        .collect();
-    let place: BTreeMap<&str, usize> = classes.iter().enumerate().map(|(i, c)| (c.as_str(), i)).collect();
-    let zeros = || vec![vec![0.0; classes.len()]; classes.len()];
-    let (mut answers, mut sums, mut counts) = (zeros(), zeros(), zeros());
-    for query in &evaluation.queries {
-        let row = place[query.class.as_str()];
-        for (rank, (class, score)) in query.ranked.iter().enumerate() {
-            let column = place[class.as_str()];
-            sums[row][column] += score;
-            counts[row][column] += 1.0;
-            if rank == 0 {
-                answers[row][column] += 1.0;
-            }
-        }
-    }
-    let confusion = HeatMap {
-        row_axis: "true class",
-        column_axis: "answered class",
-        value: "queries",
-        rows: &classes,
-        columns: &classes,
-        values: &answers,
-    };
-    let title = format!(
-        "Answers of {protocol}: {} of {} right",
-        evaluation.correct, evaluation.total
-    );
-    let matrix = ClassMatrix {
-        protocol: protocol.to_owned(),
-        method: "queries".to_owned(),
-        category: TOTAL.to_owned(),
-        values: sums
-            .iter()
-            .zip(&counts)
-            .map(|(s, n)| s.iter().zip(n).map(|(s, n)| s / n).collect())
-            .collect(),
-        classes: classes.clone(),
-    };
-    let mut sheets = vec![
-        Sheet {
-            name: "confusion.svg".to_owned(),
-            svg: heat_map(&title, &confusion)?,
-        },
-        dissimilarity(&matrix)?,
-    ];
-    if matrix.values.iter().flatten().all(|v| v.is_finite()) {
-        sheets.push(class_embedding(&matrix)?);
-    }
-    for sheet in &mut sheets {
-        sheet.name = format!("{}-{}", protocol.replace('/', "-"), sheet.name);
     }
     Ok(sheets)
 }
@@ -250,15 +191,17 @@ fn prefer<'a>(
     from.iter().copied().filter(|m| kind(m) == chosen).collect()
 }
 
-/// Figure 5.
-fn dissimilarity(matrix: &ClassMatrix) -> Result<Sheet, FigureError> {
+/// Figure 5. `row_axis` says whose the rows are.
+pub(super) fn dissimilarity(matrix: &ClassMatrix, row_axis: &str) -> Result<Sheet, FigureError> {
     let map = HeatMap {
-        row_axis: "class of the deformed shapes",
+        row_axis,
         column_axis: "class they are compared with",
         value: "mean score",
         rows: &matrix.classes,
         columns: &matrix.classes,
         values: &matrix.values,
+        texts: None,
+        shares: false,
     };
     let title = format!(
         "Dissimilarity of classes: {}, protocol {}",
@@ -272,7 +215,7 @@ fn dissimilarity(matrix: &ClassMatrix) -> Result<Sheet, FigureError> {
 }
 
 /// Figure 6.
-fn class_embedding(matrix: &ClassMatrix) -> Result<Sheet, FigureError> {
+pub(super) fn class_embedding(matrix: &ClassMatrix) -> Result<Sheet, FigureError> {
     let embedded = classical_mds(between_classes(&matrix.values)?.as_ref())?;
     let points: Vec<EmbeddedPoint> = matrix
         .classes

@@ -42,3 +42,4 @@ pub use config::ServiceConfig;
 pub use router::router;
 pub use serve::{announce, serve};
 pub use state::{AppState, OpenError};
+pub use tls::check_tls;

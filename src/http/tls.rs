@@ -24,6 +24,14 @@ pub enum TlsError {
     },
 }
 
+/// Whether the certificate and its key can be used, before anything listens or is opened.
+///
+/// # Errors
+/// [`TlsError`].
+pub fn check_tls(config: &ServiceConfig) -> Result<(), TlsError> {
+    Tls::load(config).map(drop)
+}
+
 /// How connections are secured.
 pub(super) enum Tls {
     /// Not at all.

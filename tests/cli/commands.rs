@@ -226,6 +226,40 @@ fn evaluate_tells_the_classes_of_a_small_zoo_apart_and_names_refused_files() {
     assert!(text.contains("even/odd"), "{text}");
     let unknown = run(dir.path(), &["evaluate", "shapes", "--same", "unicorn,pegasus"]);
     assert_eq!(unknown.status.code(), Some(2));
+
+    let drawn = run(
+        dir.path(),
+        &[
+            "evaluate",
+            "shapes",
+            "--protocol",
+            "even-odd",
+            "--protocol",
+            "retrieval",
+            "--set",
+            "atoms=16",
+            "--figures",
+            "figures",
+        ],
+    );
+    assert_eq!(
+        drawn.status.code(),
+        Some(1),
+        "the broken file: {}",
+        stderr(&drawn)
+    );
+    for name in [
+        "even-odd-accuracy.svg",
+        "even-odd-confusion.svg",
+        "even-odd-dissimilarity.svg",
+        "even-odd-worst.svg",
+        "retrieval-precision-recall.svg",
+    ] {
+        let svg = std::fs::read_to_string(dir.path().join("figures").join(name)).unwrap();
+        assert!(svg.contains("</svg>"), "{name}");
+        let pictures = svg.matches("<polygon").count();
+        assert!(name != "even-odd-worst.svg" || pictures > 1000, "{pictures}");
+    }
 }
 
 #[test]

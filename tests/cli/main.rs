@@ -1,12 +1,16 @@
 //! The built binary, as a shell sees it.
 
 mod benchmark;
+mod catalogue;
 mod commands;
 mod configuration;
+mod figures;
+mod https;
 mod keys;
 mod readme;
 mod service;
 mod strangers;
+mod usage;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

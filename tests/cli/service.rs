@@ -59,7 +59,7 @@ fn best(answer: &serde_json::Value) -> &str {
     answer["classes"][0]["class"]["name"].as_str().unwrap()
 }
 
-fn first_file(dir: &Path, class: &str) -> String {
+pub fn first_file(dir: &Path, class: &str) -> String {
     let folder = dir.join("shapes").join(class);
     let mut names: Vec<_> = std::fs::read_dir(folder)
         .unwrap()
@@ -69,7 +69,7 @@ fn first_file(dir: &Path, class: &str) -> String {
     names[0].to_str().unwrap().to_owned()
 }
 
-fn classes(dir: &Path) -> Vec<String> {
+pub fn classes(dir: &Path) -> Vec<String> {
     let mut names: Vec<String> = std::fs::read_dir(dir.join("shapes"))
         .unwrap()
         .map(|e| e.unwrap().file_name().into_string().unwrap())
@@ -87,12 +87,8 @@ fn index_query_export_and_import_in_a_local_directory() {
     std::fs::rename(first_file(dir.path(), &class), &unseen).unwrap();
 
     let empty = run(dir.path(), &["query", "unseen.obj"]);
-    assert_eq!(empty.status.code(), Some(1), "nothing is indexed");
-    assert!(
-        stderr(&empty).contains("shapelex: unseen.obj: "),
-        "{}",
-        stderr(&empty)
-    );
+    assert_eq!(empty.status.code(), Some(2), "there is no data directory");
+    assert!(!dir.path().join("shapelex-data").exists());
 
     let indexed = last_json(&answer(
         dir.path(),
@@ -140,7 +136,7 @@ fn index_query_export_and_import_in_a_local_directory() {
         );
     }
     let nothing = run(dir.path(), &["export", "--out", file, "--data", "nowhere"]);
-    assert_eq!(nothing.status.code(), Some(1));
+    assert_eq!(nothing.status.code(), Some(2));
     assert!(!dir.path().join("nowhere").exists());
 }
 
@@ -165,7 +161,9 @@ fn refused_files_are_named_and_stop_the_learning_unless_told_otherwise() {
     assert!(stderr(&output).contains("zz.obj: "), "{}", stderr(&output));
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("nothing was learnt"), "{text}");
-    let text = answer(dir.path(), &["index", "shapes", "--keep-going"]);
+    let kept = run(dir.path(), &["index", "shapes", "--keep-going"]);
+    assert_eq!(kept.status.code(), Some(1), "a file was refused all the same");
+    let text = String::from_utf8(kept.stdout).unwrap();
     assert!(text.contains("classes learnt: 3"), "{text}");
 }
 
@@ -202,7 +200,11 @@ fn a_service_is_indexed_queried_and_stopped() {
 
     let locked = run(dir.path(), &["query", &file, "--data", "served"]);
     assert_eq!(locked.status.code(), Some(1));
-    assert!(stderr(&locked).contains("another process"), "{}", stderr(&locked));
+    assert!(
+        stderr(&locked).contains("another process") && stderr(&locked).contains("--server"),
+        "{}",
+        stderr(&locked)
+    );
 
     std::fs::write(dir.path().join("large.obj"), vec![b'#'; 2 << 20]).unwrap();
     let large = run(dir.path(), &["query", "large.obj", "--server", &service.url]);
@@ -254,11 +256,17 @@ fn a_snapshot_goes_to_a_file_and_back_into_a_fresh_directory_and_a_running_servi
     let listed = answer(dir.path(), &["snapshot", "list", "--data", "one"]);
     assert!(listed.contains(id), "{listed}");
 
-    let text = answer(
+    let restored = run(
         dir.path(),
         &["snapshot", "restore", "all.tar.zst", "--data", "two"],
     );
+    let text = String::from_utf8(restored.stdout.clone()).unwrap();
     assert!(text.contains("restored: 3 classes"), "{text}");
+    assert_eq!(
+        stderr(&restored),
+        "shapelex: made a new data directory: two\n",
+        "a restore that succeeds warns of nothing"
+    );
     assert_eq!(rank(&["--data", "two"]), before);
 
     let service = Service::start(dir.path(), &["--data", "three"]);

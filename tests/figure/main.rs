@@ -1,77 +1,19 @@
 //! Figures: well-formed SVG that says what it was given.
 
+mod evaluation;
+mod svg;
+mod texts;
+
 use shapelex::benchmark::deform::Deformation;
 use shapelex::figure::{
-    Bar, CostAxes, EmbeddedPoint, FigureError, GalleryRow, HeatMap, Histogram, HistogramPanel, Series, bars,
-    between_classes, classical_mds, cost_curves, embedding, gallery, heat_map, histograms, precision_recall,
+    Bar, CostAxes, EmbeddedPoint, FigureError, GalleryRow, HeatMap, Histogram, HistogramPanel, RowView,
+    Series, bars, between_classes, classical_mds, cost_curves, embedding, gallery, heat_map, histograms,
+    precision_recall,
 };
 use shapelex::sample::{ZooOptions, species};
+use svg::{nothing_is_cut, says};
 
-/// Checks that every tag is closed in order, that attributes are quoted, and that text is escaped; returns the texts.
-fn well_formed(svg: &str) -> Vec<String> {
-    let mut open: Vec<&str> = Vec::new();
-    let mut texts = Vec::new();
-    let mut rest = svg;
-    while let Some(at) = rest.find('<') {
-        let text = rest[..at].trim();
-        if !text.is_empty() {
-            for (i, _) in text.match_indices('&') {
-                let entity = &text[i..text[i..].find(';').map_or(i, |end| i + end + 1)];
-                assert!(
-                    ["&amp;", "&lt;", "&gt;", "&quot;", "&apos;"].contains(&entity),
-                    "{text}"
-                );
-            }
-            texts.push(text.to_owned());
-        }
-        let end = at + rest[at..].find('>').expect("an unclosed tag");
-        let tag = &rest[at + 1..end];
-        rest = &rest[end + 1..];
-        assert!(!tag.contains('<'), "{tag}");
-        if let Some(name) = tag.strip_prefix('/') {
-            assert_eq!(open.pop(), Some(name));
-            continue;
-        }
-        assert_eq!(tag.matches('"').count() % 2, 0, "{tag}");
-        let name = tag.split([' ', '/']).next().unwrap();
-        for attribute in tag.split('"').step_by(2).map(str::trim) {
-            let attribute = attribute.trim_start_matches(name).trim();
-            assert!(
-                attribute.is_empty() || attribute == "/" || attribute.ends_with('='),
-                "{tag}"
-            );
-        }
-        if !tag.ends_with('/') {
-            open.push(name);
-        }
-    }
-    assert!(open.is_empty(), "not closed: {open:?}");
-    assert!(rest.trim().is_empty(), "{rest}");
-    assert!(!svg.contains("NaN") && !svg.contains("inf\""));
-    texts
-}
-
-fn says(svg: &str, labels: &[&str]) {
-    let texts = well_formed(svg);
-    for label in labels {
-        assert!(texts.iter().any(|t| t == label), "no '{label}' in {texts:?}");
-    }
-    assert!(svg.starts_with("<svg xmlns="));
-    assert!(svg.contains("<title>"));
-    save(svg);
-}
-
-/// With `SHAPELEX_FIGURES=DIR` the tests leave their figures in DIR, to be looked at.
-fn save(svg: &str) {
-    let Some(dir) = std::env::var_os("SHAPELEX_FIGURES") else {
-        return;
-    };
-    let title = svg.split("<title>").nth(1).unwrap().split('<').next().unwrap();
-    let name: String = title.chars().filter(char::is_ascii_alphanumeric).collect();
-    std::fs::write(std::path::Path::new(&dir).join(format!("{name}.svg")), svg).unwrap();
-}
-
-fn names(list: &[&str]) -> Vec<String> {
+pub fn names(list: &[&str]) -> Vec<String> {
     list.iter().map(|&s| s.to_owned()).collect()
 }
 
@@ -90,6 +32,7 @@ fn a_gallery_shows_every_deformation_and_stays_small() {
             let mut meshes = vec![Some(null.clone())];
             meshes.extend(Deformation::ALL.map(|d| Some(d.apply(&null, 4, 1))));
             GalleryRow {
+                view: RowView::Shared,
                 label: kind.name().to_owned(),
                 meshes,
             }
@@ -174,9 +117,9 @@ fn histograms_name_panels_and_lines() {
     ));
 }
 
-const CLASSES: [&str; 6] = ["man", "woman", "cat", "lioness", "horse", "elephant"];
+pub const CLASSES: [&str; 6] = ["man", "woman", "cat", "lioness", "horse", "elephant"];
 
-fn errors() -> Vec<Vec<f64>> {
+pub fn errors() -> Vec<Vec<f64>> {
     let places: [[f64; 2]; 6] = [
         [0.0, 0.0],
         [0.4, 0.1],
@@ -209,17 +152,21 @@ fn a_heat_map_names_rows_columns_and_values() {
         rows: &labels,
         columns: &labels,
         values: &values,
+        texts: None,
+        shares: false,
     };
     let svg = heat_map("Dissimilarity of classes", &map).unwrap();
     says(&svg, &CLASSES);
     says(&svg, &["class of the query", "mean objective", "–", "0.3770"]);
-    let long = "a class with a name that is much too long for its place".to_owned();
+    let long = "a class with a name that is much longer than most names are".to_owned();
     let odd = HeatMap {
-        rows: &[long],
+        rows: std::slice::from_ref(&long),
         values: &values[..1],
         ..map.clone()
     };
-    well_formed(&heat_map("One row", &odd).unwrap());
+    let svg = heat_map("One row", &odd).unwrap();
+    says(&svg, &[&long]);
+    nothing_is_cut(&svg);
     let ragged = HeatMap {
         columns: &labels[..4],
         ..map
@@ -323,59 +270,6 @@ fn bars_carry_their_values() {
         &["man", "0.37700", "0.42700"],
     );
     assert!(matches!(bars("x", "y", &[]), Err(FigureError::Empty { .. })));
-}
-
-#[test]
-fn an_evaluation_gives_confusion_dissimilarity_and_embedding() {
-    use shapelex::benchmark::{Evaluation, Protocol, QueryResult};
-    use shapelex::figure::evaluation_figures;
-
-    let queries: Vec<QueryResult> = errors()
-        .iter()
-        .enumerate()
-        .map(|(i, row)| {
-            let mut ranked: Vec<(String, f64)> =
-                names(&CLASSES).into_iter().zip(row.iter().copied()).collect();
-            ranked.sort_by(|a, b| a.1.total_cmp(&b.1));
-            QueryResult {
-                class: CLASSES[i].to_owned(),
-                name: "0".to_owned(),
-                ranked,
-                correct: true,
-                true_rank: 1,
-                error_margin: -0.1,
-            }
-        })
-        .collect();
-    let mut evaluation = Evaluation {
-        protocol: Protocol::EvenOdd,
-        correct: 6,
-        total: 6,
-        queries,
-        confusion: std::collections::BTreeMap::new(),
-        not_queried: 0,
-    };
-    let sheets = evaluation_figures(&evaluation).unwrap();
-    let files: Vec<&str> = sheets.iter().map(|s| s.name.as_str()).collect();
-    assert_eq!(
-        files,
-        [
-            "even-odd-confusion.svg",
-            "even-odd-dissimilarity.svg",
-            "even-odd-mds.svg"
-        ]
-    );
-    says(
-        &sheets[0].svg,
-        &["Answers of even/odd: 6 of 6 right", "elephant", "1"],
-    );
-    says(&sheets[1].svg, &["0.3770"]);
-    says(&sheets[2].svg, &CLASSES);
-    // A class that some were not compared with leaves a gap, and no plane.
-    evaluation.queries[0].ranked.truncate(3);
-    assert_eq!(evaluation_figures(&evaluation).unwrap().len(), 2);
-    evaluation.queries.clear();
-    assert!(evaluation_figures(&evaluation).is_err());
 }
 
 #[test]

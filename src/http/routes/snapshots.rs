@@ -201,7 +201,7 @@ fn take_over(parts: &Parts, staged: Staged<'_>) -> Result<Restored, Problem> {
     let _alone = parts.catalogue.lock().unwrap_or_else(PoisonError::into_inner);
     let restored = parts.jobs.exclusively(|| staged.switch())?;
     parts.keys.replace(parts.store.api_keys()?);
-    tracing::warn!(snapshot = %restored.id, classes = restored.classes, shapes = restored.shapes, "restored");
+    tracing::info!(snapshot = %restored.id, classes = restored.classes, shapes = restored.shapes, "restored");
     Ok(restored)
 }
 

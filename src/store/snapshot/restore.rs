@@ -105,7 +105,7 @@ impl Staged<'_> {
         inner.failure.acknowledge(writer.sequence);
         self.store.forget_damage();
         for line in notes {
-            tracing::warn!(line, "restored");
+            tracing::info!(line, "restored");
         }
         Ok(self.restored.clone())
     }

@@ -44,7 +44,7 @@ pub(in super::super) fn log_in_force(data: &Path) -> PathBuf {
 pub(in super::super) fn go_on(data: &Path) -> Result<(), StoreError> {
     let (ready, replaced) = (data.join(READY), data.join(REPLACED));
     if ready.exists() {
-        tracing::warn!("switching to the restored state");
+        tracing::info!("switching to the restored state");
         files::create_directory(&replaced)
             .map_err(|e| StoreError::io(format!("make {}", replaced.display()), &e))?;
         for part in PARTS {

@@ -1,0 +1,162 @@
+//! Arguments → [`Cli`]: which of flag and environment counts, and whose mistake a wrong value is.
+
+use super::Cli;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Arg, Command, CommandFactory, FromArgMatches};
+use std::error::Error;
+use std::ffi::OsString;
+
+/// Places a command can work in, of which one counts.
+const PLACES: [&str; 3] = ["data", "server", "dictionaries"];
+
+/// No environment has a variable of this name; clap cannot take an argument's variable away.
+const NO_VARIABLE: &str = "";
+
+/// Why there is no [`Cli`].
+pub enum ParseError {
+    /// Help, the version or a mistake, as clap says it.
+    Clap(clap::Error),
+    /// A wrong value of an environment variable, as one line.
+    Environment(String),
+}
+
+/// Parses the arguments. A place named by a flag wins over one that the environment names.
+///
+/// # Errors
+/// [`ParseError`].
+pub fn parse(args: impl IntoIterator<Item = OsString>) -> Result<Cli, ParseError> {
+    let args: Vec<OsString> = args.into_iter().collect();
+    let mut command = Cli::command();
+    if PLACES.iter().any(|place| names(&args, place)) {
+        command = without_environment(command, &args);
+    }
+    let told = |error: clap::Error| match of_environment(&error, &args) {
+        Some(line) => ParseError::Environment(line),
+        None => ParseError::Clap(error),
+    };
+    let matches = command.try_get_matches_from(&args).map_err(told)?;
+    Cli::from_arg_matches(&matches).map_err(told)
+}
+
+/// Whether the arguments have a flag.
+fn names(args: &[OsString], long: &str) -> bool {
+    let flag = format!("--{long}");
+    let assigned = format!("{flag}=");
+    args.iter()
+        .take_while(|arg| *arg != "--")
+        .filter_map(|arg| arg.to_str())
+        .any(|arg| arg == flag || arg.starts_with(&assigned))
+}
+
+/// The command, whose places are taken from the arguments only.
+fn without_environment(command: Command, args: &[OsString]) -> Command {
+    let subcommands: Vec<String> = command
+        .get_subcommands()
+        .map(|c| c.get_name().to_owned())
+        .collect();
+    let silent: Vec<&str> = PLACES
+        .into_iter()
+        .filter(|place| !names(args, place))
+        .filter(|place| command.get_arguments().any(|arg| arg.get_id() == place))
+        .collect();
+    let command = silent.into_iter().fold(command, |c, place| {
+        c.mut_arg(place, |arg| arg.env(NO_VARIABLE).hide_env(true))
+    });
+    subcommands.into_iter().fold(command, |c, name| {
+        c.mut_subcommand(name, |sub| without_environment(sub, args))
+    })
+}
+
+/// The line about a wrong value that came out of the environment; `None` where it did not.
+fn of_environment(error: &clap::Error, args: &[OsString]) -> Option<String> {
+    let text = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.clone()),
+        _ => None,
+    };
+    let invalid = text(ContextKind::InvalidArg)?;
+    let (_, variable, value) = from_environment(&invalid, args)?;
+    match error.kind() {
+        ErrorKind::ArgumentConflict => {
+            let other = text(ContextKind::PriorArg).unwrap_or_default();
+            let other = from_environment(&other, args).map_or(other, |(_, variable, _)| variable);
+            Some(format!(
+                "{variable} cannot be used with {other}; unset one of them"
+            ))
+        }
+        ErrorKind::InvalidValue => {
+            let expected = match error.get(ContextKind::ValidValue) {
+                Some(ContextValue::Strings(names)) => format!("expected one of {}", names.join(", ")),
+                _ => "this value is not known".to_owned(),
+            };
+            Some(format!("{variable}='{value}': {expected}"))
+        }
+        _ => {
+            let reason = error
+                .source()
+                .map_or_else(|| "this value is wrong".to_owned(), ToString::to_string);
+            Some(format!("{variable}='{value}': {reason}"))
+        }
+    }
+}
+
+/// The flag as the arguments would spell it, its variable and the variable's value, where the value came from there.
+/// `shown` is how clap spells an argument, such as `--listen <ADDRESS>`.
+fn from_environment(shown: &str, args: &[OsString]) -> Option<(String, String, String)> {
+    let long = shown.strip_prefix("--")?.split([' ', '=', '[']).next()?;
+    if names(args, long) {
+        return None;
+    }
+    let mut command = Cli::command();
+    command.build();
+    let variable = variable_of(&command, long)?;
+    let value = std::env::var_os(&variable)?;
+    Some((
+        format!("--{long}"),
+        variable,
+        value.to_string_lossy().into_owned(),
+    ))
+}
+
+/// The environment variable of the first argument of that name, in any subcommand.
+fn variable_of(command: &Command, long: &str) -> Option<String> {
+    let of = |arg: &Arg| arg.get_env().map(|name| name.to_string_lossy().into_owned());
+    command
+        .get_arguments()
+        .find(|arg| arg.get_long() == Some(long))
+        .and_then(of)
+        .or_else(|| command.get_subcommands().find_map(|sub| variable_of(sub, long)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn args(list: &[&str]) -> Vec<OsString> {
+        list.iter().map(OsString::from).collect()
+    }
+
+    #[test]
+    fn flags_are_found_in_both_spellings_and_not_after_the_dashes() {
+        assert!(names(&args(&["shapelex", "query", "--data", "d"]), "data"));
+        assert!(names(&args(&["shapelex", "query", "--data=d"]), "data"));
+        assert!(!names(&args(&["shapelex", "query", "--database"]), "data"));
+        assert!(!names(&args(&["shapelex", "query", "--", "--data"]), "data"));
+    }
+
+    #[test]
+    fn a_place_of_the_arguments_silences_the_others_of_the_environment() {
+        let of = |list: &[&str]| {
+            let mut command = without_environment(Cli::command(), &args(list));
+            command.build();
+            let query = command.find_subcommand("query").unwrap().clone();
+            let has = |id: &str| {
+                let arg = query.get_arguments().find(|a| a.get_id() == id).unwrap();
+                arg.get_env().is_some_and(|name| !name.is_empty())
+            };
+            (has("data"), has("server"))
+        };
+        assert_eq!(of(&["shapelex", "query", "--data", "d"]), (true, false));
+        assert_eq!(of(&["shapelex", "query", "--server", "u"]), (false, true));
+        assert_eq!(of(&["shapelex", "query", "--dictionaries", "f"]), (false, false));
+    }
+}

@@ -1,0 +1,36 @@
+//! Whom a client believes that a https:// service is who it says.
+
+use super::CliError;
+use std::path::Path;
+use std::sync::Arc;
+use ureq::tls::{Certificate, PemItem, RootCerts, TlsConfig, parse_pem};
+
+/// Trust in the certificates of a PEM file, or in the well-known authorities where there is none.
+///
+/// # Errors
+/// [`CliError::Usage`] where the file cannot be read or has no certificate.
+pub fn config(ca_cert: Option<&Path>) -> Result<TlsConfig, CliError> {
+    let roots = match ca_cert {
+        None => RootCerts::WebPki,
+        Some(path) => {
+            let wrong = |reason: String| CliError::Usage(format!("--ca-cert {}: {reason}", path.display()));
+            let pem = std::fs::read(path).map_err(|error| wrong(error.to_string()))?;
+            let certificates = certificates(&pem).map_err(wrong)?;
+            RootCerts::Specific(Arc::new(certificates))
+        }
+    };
+    Ok(TlsConfig::builder().root_certs(roots).build())
+}
+
+fn certificates(pem: &[u8]) -> Result<Vec<Certificate<'static>>, String> {
+    let mut found = Vec::new();
+    for item in parse_pem(pem) {
+        if let PemItem::Certificate(certificate) = item.map_err(|error| error.to_string())? {
+            found.push(certificate);
+        }
+    }
+    if found.is_empty() {
+        return Err("there is no certificate in it; expected PEM, -----BEGIN CERTIFICATE-----".to_owned());
+    }
+    Ok(found)
+}

@@ -1,0 +1,63 @@
+//! `--server https://…`: a service behind TLS, trusted by a certificate of one's own.
+
+use crate::{run, stderr};
+use rcgen::{CertifiedKey, generate_simple_self_signed};
+use rustls::pki_types::{PrivateKeyDer, PrivatePkcs8KeyDer};
+use rustls::{ServerConfig, ServerConnection, StreamOwned};
+use std::io::{BufRead, BufReader, Write};
+use std::net::TcpListener;
+use std::sync::Arc;
+
+/// Answers every request over TLS with `{"status":"ok"}`; gives its address and its certificate as PEM.
+fn secure_service() -> (String, String) {
+    let CertifiedKey { cert, signing_key } =
+        generate_simple_self_signed(["localhost".to_owned(), "127.0.0.1".to_owned()]).unwrap();
+    let key = PrivateKeyDer::Pkcs8(PrivatePkcs8KeyDer::from(signing_key.serialize_der()));
+    let config = ServerConfig::builder_with_provider(Arc::new(rustls::crypto::ring::default_provider()))
+        .with_safe_default_protocol_versions()
+        .unwrap()
+        .with_no_client_auth()
+        .with_single_cert(vec![cert.der().clone()], key)
+        .unwrap();
+    let config = Arc::new(config);
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("https://{}", listener.local_addr().unwrap());
+    std::thread::spawn(move || {
+        for stream in listener.incoming() {
+            let connection = ServerConnection::new(Arc::clone(&config)).unwrap();
+            let mut stream = BufReader::new(StreamOwned::new(connection, stream.unwrap()));
+            let mut line = String::new();
+            // A client that does not trust the certificate leaves here.
+            while stream.read_line(&mut line).is_ok_and(|n| n > 2) {
+                line.clear();
+            }
+            let body = "{\"status\":\"ok\"}";
+            let _ = write!(
+                stream.get_mut(),
+                "HTTP/1.1 200 OK\r\ncontent-length: {}\r\nconnection: close\r\n\r\n{body}",
+                body.len()
+            );
+            let _ = stream.get_mut().flush();
+        }
+    });
+    (url, cert.pem())
+}
+
+#[test]
+fn a_service_behind_tls_is_trusted_by_its_own_certificate_only() {
+    let dir = tempfile::tempdir().unwrap();
+    let (url, pem) = secure_service();
+    std::fs::write(dir.path().join("ca.pem"), pem).unwrap();
+    let trusted = run(dir.path(), &["health", "--server", &url, "--ca-cert", "ca.pem"]);
+    assert!(trusted.status.success(), "{}", stderr(&trusted));
+    assert_eq!(trusted.stdout, b"alive\n");
+    let unknown = run(dir.path(), &["health", "--server", &url]);
+    assert_eq!(unknown.status.code(), Some(1));
+    assert!(stderr(&unknown).contains(&url), "{}", stderr(&unknown));
+    std::fs::write(dir.path().join("none.pem"), "no certificate").unwrap();
+    for file in ["none.pem", "missing.pem"] {
+        let wrong = run(dir.path(), &["health", "--server", &url, "--ca-cert", file]);
+        assert_eq!(wrong.status.code(), Some(2), "{}", stderr(&wrong));
+        assert!(stderr(&wrong).contains(file), "{}", stderr(&wrong));
+    }
+}
