@@ -23,6 +23,9 @@ pub enum Access {
     Needs(Scope),
 }
 
+/// What requests belong to whose address or method no operation has; nothing is done for them.
+pub const UNMATCHED: &str = "unmatched";
+
 /// What an operation demands. One that is not listed needs the greatest scope, so that a new one is closed until it
 /// is decided about.
 pub fn access_of(operation: &str) -> Access {
@@ -49,7 +52,12 @@ pub fn is_probe(operation: &str) -> bool {
 pub fn needs_local_token(operation: &str) -> bool {
     let open = matches!(
         operation,
-        "create_snapshot" | "list_snapshots" | "get_snapshot" | "get_snapshot_file" | "delete_snapshot"
+        UNMATCHED
+            | "create_snapshot"
+            | "list_snapshots"
+            | "get_snapshot"
+            | "get_snapshot_file"
+            | "delete_snapshot"
     );
     access_of(operation) == Access::Needs(Scope::Admin) && !open
 }
