@@ -11,7 +11,9 @@ import { chromium } from "playwright-core";
 const binary = process.env.SHAPELEX_BIN;
 const work = mkdtempSync(join(tmpdir(), "shapelex-browser-"));
 const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-  "--disable-component-update", "--disable-sync", "--host-resolver-rules=MAP evil.test 127.0.0.1"];
+  "--disable-component-update", "--disable-sync", "--host-resolver-rules=MAP evil.test 127.0.0.1",
+  // Chromium has begun to keep pages of the network away from loopback; the service must not depend on it.
+  "--disable-features=LocalNetworkAccessChecks,BlockInsecurePrivateNetworkRequests"];
 
 /** A service in a directory of its own, on a free port. */
 async function serve(name, args = []) {
