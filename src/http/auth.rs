@@ -46,7 +46,7 @@ pub fn is_probe(operation: &str) -> bool {
     matches!(operation, "get_liveness" | "get_readiness")
 }
 
-/// Whether an operation needs the local token as long as there is no key: what hands the service over to somebody else,
+/// Whether an operation needs the local token as long as there is no key: what hands the service over to another owner,
 /// that is keys and restoring. What needs a key of scope `admin` and is not listed does, so that a new operation is
 /// closed until it is decided about.
 pub fn needs_local_token(operation: &str) -> bool {

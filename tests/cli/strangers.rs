@@ -313,7 +313,6 @@ mod linux {
             ["enqueued", "processing"].contains(&job["state"].as_str().unwrap()),
             "{job}"
         );
-        // It waits with 503s, not with a connection that nobody accepts.
         service.set_soft(service.limit().1);
         let began = Instant::now();
         loop {
