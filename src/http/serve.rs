@@ -136,7 +136,7 @@ fn accept_failed(server: &ConnectionServer, error: &std::io::Error, before: u32)
     if is_out_of_descriptors(error) {
         server.state.connections.dismiss_oldest();
     }
-    if before % LOG_EVERY == 0 {
+    if before.is_multiple_of(LOG_EVERY) {
         tracing::warn!(%error, "a connection could not be accepted; trying again");
     }
 }
