@@ -23,6 +23,9 @@ pub enum Access {
     Needs(Scope),
 }
 
+/// What requests belong to whose address or method no operation has; nothing is done for them.
+pub const UNMATCHED: &str = "unmatched";
+
 /// What an operation demands. One that is not listed needs the greatest scope, so that a new one is closed until it
 /// is decided about.
 pub fn access_of(operation: &str) -> Access {
@@ -43,13 +46,18 @@ pub fn is_probe(operation: &str) -> bool {
     matches!(operation, "get_liveness" | "get_readiness")
 }
 
-/// Whether an operation needs the local token as long as there is no key: what hands the service over to somebody else,
+/// Whether an operation needs the local token as long as there is no key: what hands the service over to another owner,
 /// that is keys and restoring. What needs a key of scope `admin` and is not listed does, so that a new operation is
 /// closed until it is decided about.
 pub fn needs_local_token(operation: &str) -> bool {
     let open = matches!(
         operation,
-        "create_snapshot" | "list_snapshots" | "get_snapshot" | "get_snapshot_file" | "delete_snapshot"
+        UNMATCHED
+            | "create_snapshot"
+            | "list_snapshots"
+            | "get_snapshot"
+            | "get_snapshot_file"
+            | "delete_snapshot"
     );
     access_of(operation) == Access::Needs(Scope::Admin) && !open
 }

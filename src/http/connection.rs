@@ -34,7 +34,7 @@ const SMALLEST_BUFFER: usize = 8192;
 const LEAVE_WITHIN: Duration = Duration::from_secs(1);
 
 /// What all connections share.
-pub(super) struct Line {
+pub(super) struct ConnectionServer {
     pub state: AppState,
     router: Router,
     http: http1::Builder,
@@ -43,7 +43,7 @@ pub(super) struct Line {
     cut: CancellationToken,
 }
 
-impl Line {
+impl ConnectionServer {
     /// How this service's connections are served.
     ///
     /// # Errors

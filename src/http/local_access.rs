@@ -1,7 +1,7 @@
-//! What lets the owner of the data directory in as long as there is no API key: a token in a file that nobody else can
-//! read, with the address of the service beside it.
+//! The local token: as long as there is no API key, the owner of the data directory proves to be it by a secret in a file
+//! that other users cannot read. The address of the service stands beside it.
 //!
-//! Whoever reads the data directory is trusted with everything in it; a page in a browser cannot. The token is new at
+//! A user that reads the data directory is trusted with everything in it; a page in a browser cannot read it. The token is new at
 //! each start, so that the file in a copy of the directory opens nothing, and the file goes when the service stops.
 
 use super::keyring::new_secret;

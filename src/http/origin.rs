@@ -63,7 +63,8 @@ fn is_own(config: &ServiceConfig, request: &Request, origin: &str) -> bool {
         return false;
     };
     let encrypted = *scheme == Scheme::HTTPS;
-    if !(encrypted || *scheme == Scheme::HTTP) || (config.tls_cert.is_some() && !encrypted) {
+    let plain = *scheme == Scheme::HTTP && config.tls_cert.is_none();
+    if !encrypted && !plain {
         return false;
     }
     let place = |authority: &Authority| {

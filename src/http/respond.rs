@@ -1,7 +1,7 @@
 //! What happens around every handler: a request id, a span, metrics, and a problem document for whatever failed.
 
 use super::audit::Entry;
-use super::auth::{Access, access_of, authorize, is_probe};
+use super::auth::{Access, UNMATCHED, access_of, authorize, is_probe};
 use super::host;
 use super::metrics;
 use super::origin;
@@ -204,5 +204,5 @@ fn operation(request: &Request) -> &'static str {
         .extensions()
         .get::<MatchedPath>()
         .and_then(|path| super::openapi::operation_id(method, path.as_str()))
-        .unwrap_or("unmatched")
+        .unwrap_or(UNMATCHED)
 }

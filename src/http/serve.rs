@@ -4,7 +4,7 @@
 //! a handshake limit; bodies have theirs in [`super::upload`] and [`super::extract`]. How many connections there may be
 //! is the matter of [`super::connections`].
 
-use super::connection::{Line, turn_away};
+use super::connection::{ConnectionServer, turn_away};
 use super::housekeeping;
 use super::local_access::{LocalAccess, local_url};
 use super::scrubber;
@@ -54,10 +54,10 @@ pub async fn serve(
     tokio::spawn(housekeeping::run(state.clone()));
     tokio::spawn(scrubber::run(state.clone()));
     let cut = CancellationToken::new();
-    let line = Arc::new(Line::new(state.clone(), cut.clone())?);
+    let server = Arc::new(ConnectionServer::new(state.clone(), cut.clone())?);
     let tasks = TaskTracker::new();
     tokio::select! {
-        never = accept(&line, &listener, &tasks) => match never {},
+        never = accept(&server, &listener, &tasks) => match never {},
         () = shutdown => {}
     }
     drop(listener);
@@ -78,8 +78,8 @@ pub async fn serve(
     Ok(())
 }
 
-/// Lets the owner of the data directory find the service and be known to it, until [`serve`] ends. For before anybody is
-/// told that the service listens.
+/// Writes the address and the local token to the data directory, where its owner finds them until [`serve`] ends. Call it
+/// before the service says that it listens.
 pub fn announce(state: &AppState, listening: SocketAddr) {
     let url = local_url(listening, state.config.tls_cert.is_some());
     if let Err(error) = state.local_token.publish(&state.config.data_dir, url) {
@@ -108,44 +108,48 @@ async fn close(state: &AppState, deadline: Duration) {
     }
 }
 
-async fn accept(line: &Arc<Line>, listener: &TcpListener, tasks: &TaskTracker) -> std::convert::Infallible {
+async fn accept(
+    server: &Arc<ConnectionServer>,
+    listener: &TcpListener,
+    tasks: &TaskTracker,
+) -> std::convert::Infallible {
     let polite = Arc::new(Semaphore::new(TURNED_AWAY));
     let mut failures = 0_u32;
     loop {
         let (socket, peer) = match listener.accept().await {
             Ok(accepted) => accepted,
             Err(error) => {
-                accept_failed(line, &error, failures);
+                accept_failed(server, &error, failures);
                 failures = failures.wrapping_add(1);
                 tokio::time::sleep(ACCEPT_AGAIN).await;
                 continue;
             }
         };
         failures = 0;
-        match line.state.connections.admit(peer.ip()).await {
+        match server.state.connections.admit(peer.ip()).await {
             Some(place) => {
-                let line = Arc::clone(line);
-                tasks.spawn(async move { line.serve(socket, peer, place).await });
+                let server = Arc::clone(server);
+                tasks.spawn(async move { server.serve(socket, peer, place).await });
             }
-            None => tell(line, socket, peer, &polite),
+            None => tell(server, socket, peer, &polite),
         }
     }
 }
 
 /// The system gave no connection. Where it has no descriptors left, an idle connection makes way.
-fn accept_failed(line: &Line, error: &std::io::Error, before: u32) {
+fn accept_failed(server: &ConnectionServer, error: &std::io::Error, before: u32) {
     if is_out_of_descriptors(error) {
-        line.state.connections.dismiss_oldest();
+        server.state.connections.dismiss_oldest();
     }
-    if before % LOG_EVERY == 0 {
+    if before.is_multiple_of(LOG_EVERY) {
         tracing::warn!(%error, "a connection could not be accepted; trying again");
     }
 }
 
 /// An address that has all its connections busy gets no other, and is told so where few are being told at the moment.
-fn tell(line: &Arc<Line>, socket: TcpStream, peer: SocketAddr, polite: &Arc<Semaphore>) {
+fn tell(server: &Arc<ConnectionServer>, socket: TcpStream, peer: SocketAddr, polite: &Arc<Semaphore>) {
     tracing::debug!(%peer, "the address has as many busy connections as it may; another was closed");
-    if line.is_encrypted() {
+    if server.is_encrypted() {
         return;
     }
     if let Ok(permit) = Arc::clone(polite).try_acquire_owned() {

@@ -1,7 +1,7 @@
 // What a page of another site can do to a service on loopback without keys, tried in a real browser: nothing.
 import assert from "node:assert/strict";
 import { spawn, execFileSync } from "node:child_process";
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { mkdtempSync, readFileSync, readdirSync, rmSync } from "node:fs";
 import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -11,7 +11,9 @@ import { chromium } from "playwright-core";
 const binary = process.env.SHAPELEX_BIN;
 const work = mkdtempSync(join(tmpdir(), "shapelex-browser-"));
 const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-  "--disable-component-update", "--disable-sync", "--host-resolver-rules=MAP evil.test 127.0.0.1"];
+  "--disable-component-update", "--disable-sync", "--host-resolver-rules=MAP evil.test 127.0.0.1",
+  // Chromium has begun to keep pages of the network away from loopback; the service must not depend on it.
+  "--disable-features=LocalNetworkAccessChecks,BlockInsecurePrivateNetworkRequests"];
 
 /** A service in a directory of its own, on a free port. */
 async function serve(name, args = []) {
@@ -108,7 +110,6 @@ before(async () => {
   const small = ["atoms=12", "iterations=5", "batch=64", "samples_per_shape=100", "eigenpairs=50", "energies=40"];
   execFileSync(binary, ["index", join(work, "zoo"), "--server", service.url, ...small.flatMap(s => ["--set", s])],
     { stdio: "ignore" });
-  const { readdirSync } = await import("node:fs");
   const first = readdirSync(join(work, "zoo")).find(entry => !entry.includes("."));
   meshFile = join(work, "zoo", first, readdirSync(join(work, "zoo", first))[0]);
   mesh = readFileSync(meshFile, "utf8");
@@ -135,11 +136,13 @@ describe("a service without keys on loopback", () => {
       for (const line of read) assert.match(line, / opaque 0 0$| failed$/, line);
       for (const path of ["/v1/classes", "/v1/keys", "/v1/reindex", "/v1/snapshots/restore", "/v1/classes/evil/shapes?create=true"]) {
         for (const enctype of ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data"]) {
-          await page.goto(`http://${host}:${otherPort}/`);
-          const answered = page.waitForResponse(answer => answer.request().method() === "POST");
-          await page.evaluate(submit, { service: service.url, path, enctype });
+          const sender = await browser.newPage();
+          await sender.goto(`http://${host}:${otherPort}/`);
+          const answered = sender.waitForResponse(answer => answer.request().method() === "POST");
+          await sender.evaluate(submit, { service: service.url, path, enctype });
           const answer = await answered;
           assert.equal(answer.status(), 403, `${path} ${enctype}`);
+          await sender.close();
         }
       }
       await page.close();
@@ -149,8 +152,11 @@ describe("a service without keys on loopback", () => {
 
   it("is not read by a page whose name was bound to this machine", async () => {
     const page = await browser.newPage();
-    const answer = await page.goto(`http://evil.test:${service.port}/`);
-    assert.equal(answer.status(), 421);
+    const evil = `http://evil.test:${service.port}`;
+    assert.equal((await page.goto(`${evil}/`)).status(), 421);
+    // The page came from the attacker's machine; since then its name is this machine's.
+    await page.route(`${evil}/attack`, route => route.fulfill({ contentType: "text/html", body: "<title>evil</title>" }));
+    await page.goto(`${evil}/attack`);
     const read = await page.evaluate(async () => {
       const found = [];
       for (const path of ["/v1/classes", "/v1/index", "/v1/snapshots", "/openapi.json"]) {

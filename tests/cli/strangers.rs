@@ -263,7 +263,7 @@ mod linux {
     #[test]
     fn the_limit_of_open_files_is_raised_and_connections_fit_it() {
         let dir = tempfile::tempdir().unwrap();
-        let service = Limited::start(dir.path(), "ulimit -Hn 4096; ulimit -Sn 200", "");
+        let service = Limited::start(dir.path(), "ulimit -Sn 200; ulimit -Hn 4096", "");
         assert_eq!(service.limit(), (4096, 4096));
         drop(service);
         let service = Limited::start(dir.path(), "ulimit -n 256", "");
@@ -313,7 +313,6 @@ mod linux {
             ["enqueued", "processing"].contains(&job["state"].as_str().unwrap()),
             "{job}"
         );
-        // It waits with 503s, not with a connection that nobody accepts.
         service.set_soft(service.limit().1);
         let began = Instant::now();
         loop {

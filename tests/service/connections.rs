@@ -184,7 +184,7 @@ async fn asked(mut stream: TcpStream, request: &str) -> String {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn idle_connections_of_one_address_keep_nobody_out() {
+async fn idle_connections_of_one_address_do_not_keep_others_out() {
     let running = start(|c| {
         c.max_connections = 1024;
         c.header_timeout = Duration::from_secs(60);
