@@ -186,7 +186,12 @@ impl<'a> Rows<'a> {
         if ended {
             return Err(self.too_short());
         }
-        read(&mut self.scan).ok_or_else(|| malformed(format!("{}: expected a number", self.scan.place())))
+        read(&mut self.scan).ok_or_else(|| {
+            let (line, text) = (self.scan.line_number(), self.scan.excerpt());
+            malformed(format!(
+                "line {line} after the header, `{text}`: expected a number"
+            ))
+        })
     }
 
     #[cold]
