@@ -80,7 +80,11 @@ fn keeps_border(n: usize, faces: &[[u32; 3]]) {
 
 fn doubled_area(points: &[Point]) -> f64 {
     let next = points.iter().cycle().skip(1);
-    points.iter().zip(next).map(|(p, q)| p[0] * q[1] - p[1] * q[0]).sum()
+    points
+        .iter()
+        .zip(next)
+        .map(|(p, q)| p[0] * q[1] - p[1] * q[0])
+        .sum()
 }
 
 fn turn(a: Point, b: Point, c: Point) -> f64 {
@@ -103,7 +107,8 @@ fn is_simple(points: &[Point]) -> bool {
                     return !is_between(a, b, c) && !is_between(c, d, b);
                 }
                 let crosses = turn(a, b, c) * turn(a, b, d) < 0.0 && turn(c, d, a) * turn(c, d, b) < 0.0;
-                let touches = is_between(a, b, c) || is_between(a, b, d) || is_between(c, d, a) || is_between(c, d, b);
+                let touches =
+                    is_between(a, b, c) || is_between(a, b, d) || is_between(c, d, a) || is_between(c, d, b);
                 !crosses && !touches
             })
     })

@@ -17,6 +17,9 @@ pub fn detect(bytes: &[u8], media_type: Option<&str>, name: Option<&str>) -> Res
         .ok_or(MeshError::UnknownFormat)
 }
 
+/// Bytes of a text that are looked at: nothing stops the look, so it must be short.
+const START: usize = 4 << 20;
+
 /// The format the bytes alone tell, or `None`. A start that is unmistakable counts even if the rest is broken; a
 /// truncated binary STL and an OBJ without vertices are not recognised.
 pub fn from_bytes(bytes: &[u8]) -> Option<Format> {
@@ -30,18 +33,19 @@ pub fn from_bytes(bytes: &[u8]) -> Option<Format> {
     if super::stl::is_binary(bytes) {
         return Some(Format::Stl);
     }
-    let mut text = Scanner::new(bytes);
+    let start = &bytes[..bytes.len().min(START)];
+    let mut text = Scanner::new(start);
     if text.skip_whitespace() && text.peek() == Some(b'{') {
         let asset = memchr::memmem::find(bytes, b"\"asset\"");
         return asset.map(|_| Format::Gltf);
     }
-    if super::stl::is_text(bytes) {
+    if super::stl::is_text(start) {
         return Some(Format::Stl);
     }
-    if super::off::has_keyword(bytes) {
+    if super::off::has_keyword(start) {
         return Some(Format::Off);
     }
-    is_obj(bytes).then_some(Format::Obj)
+    is_obj(start).then_some(Format::Obj)
 }
 
 /// Statements an OBJ file may hold before its first vertex, or instead of one in a broken file.

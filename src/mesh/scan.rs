@@ -92,7 +92,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// Goes to the end of the text if a stop was asked for.
-    fn look_at_cancel(&mut self) {
+    pub fn look_at_cancel(&mut self) {
         if self.cancel.is_some_and(Cancel::is_cancelled) {
             self.at = self.bytes.len();
         }

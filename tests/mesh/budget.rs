@@ -175,6 +175,11 @@ fn long_runs() -> Vec<(&'static str, Format, Vec<u8>)> {
     runs.push(("one face", Format::Obj, fill(&format!("{tetrahedron}f"), " 1")));
     runs.push(("a name", Format::Stl, fill("solid facet ", "x y")));
     runs.push(("lines of blanks", Format::Off, fill("OFF\n3 1 0\n", " \n")));
+    runs.push(("a list passed over", Format::Ply, {
+        let head = "ply\nformat ascii 1.0\nelement dust 1\nproperty list int int x\nend_header\n";
+        fill(&format!("{head}{} ", length / 2), "1 ")
+    }));
+    runs.push(("keywords", Format::Stl, fill("solid\n", "endloop ")));
     runs.push(("rows passed over", Format::Ply, {
         let head = format!(
             "ply\nformat ascii 1.0\nelement dust {}\nproperty int x\nend_header\n",
@@ -284,4 +289,44 @@ fn long_lines_take_no_copies() {
         2
     );
     assert_eq!(budget.used(), 0);
+}
+
+/// Polygons that make a simple algorithm slow: each is read within a bound on processor time that a square exceeds.
+#[cfg(target_os = "linux")]
+#[test]
+fn polygons_of_many_corners_take_no_quadratic_time() {
+    let obj = |points: &[[f64; 2]], corners: usize| {
+        let mut text = String::new();
+        points.iter().for_each(|[x, y]| _ = writeln!(text, "v {x} {y} 0"));
+        for k in 0..points.len() / corners {
+            text += "f";
+            (1..=corners).for_each(|c| _ = write!(text, " {}", k * corners + c));
+            text += "\n";
+        }
+        text.into_bytes()
+    };
+    let million = 1_000_000;
+    let comb = |n: usize| -> Vec<[f64; 2]> {
+        let teeth = (0..n - 2).map(|k| [k as f64, if k % 2 == 0 { 0.0 } else { n as f64 }]);
+        teeth.chain([[n as f64, -1.0], [0.0, -1.0]]).collect()
+    };
+    let noise: Vec<[f64; 2]> = (0..2 * million as u64)
+        .map(|k| [(k * k * 31 % 10_007) as f64, (k * k * k % 10_009) as f64])
+        .collect();
+    for (what, points, corners) in [
+        ("a comb", comb(million), million),
+        ("crossing", noise[..million].to_vec(), million),
+        ("many crossing", noise.clone(), 32),
+        ("many crossing, with a sweep", noise.clone(), 40),
+        ("crossing quadrilaterals", noise, 4),
+    ] {
+        let bytes = obj(&points, corners);
+        let context = ReadContext::new(Limits::default());
+        let began = processor_time();
+        let soup = read(&bytes, Format::Obj, &context).expect("polygons");
+        let took = processor_time() - began;
+        println!("{what}: {} faces, {:.2} s", soup.faces.len(), took.as_secs_f64());
+        assert_eq!(soup.faces.len(), points.len() / corners * (corners - 2), "{what}");
+        assert!(took < Duration::from_secs(5), "{what}: {took:?}");
+    }
 }

@@ -13,6 +13,9 @@ use super::super::{Format, MeshError};
 use super::header::{Element, Encoding, Header, Scalar, Type, malformed};
 use crate::cancel::Cancel;
 
+/// Items of a list between two looks at the stop flag.
+const STRIDE: usize = 4096;
+
 /// What a line is in an ascii file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Lines {
@@ -167,7 +170,12 @@ impl<'a> Payload<'a> {
                         .ok_or_else(|| truncated("it ends within a list"))?;
                     return Ok(());
                 }
-                for _ in 0..length {
+                for k in 0..length {
+                    if let Self::Ascii(rows) = self
+                        && k.is_multiple_of(STRIDE)
+                    {
+                        rows.scan.look_at_cancel();
+                    }
                     self.scalar(item)?;
                 }
                 Ok(())

@@ -12,7 +12,7 @@ use super::corners::Corners;
 
 /// Whether the text begins with `solid`, and is one as far as a binary header goes.
 pub(super) fn begins_with_solid(bytes: &[u8]) -> bool {
-    let mut scan = Scanner::new(bytes);
+    let mut scan = Scanner::new(&bytes[..bytes.len().min(1 << 20)]);
     scan.skip_whitespace();
     let start = scan.rest();
     let text = |b: &u8| matches!(b, b'\t'..=b'\r' | b' '..);
