@@ -88,11 +88,7 @@ pub(super) fn has_keyword(bytes: &[u8]) -> bool {
 /// for other than three dimensions. [`MeshError::Truncated`] when the counts promise more than there is.
 pub fn read(bytes: &[u8], context: &ReadContext) -> Result<TriangleSoup, MeshError> {
     let mut scan = Scanner::new(bytes).stopped_by(&context.cancel);
-    let read = Reader::begin(&mut scan, context).and_then(|mut reader| {
-        reader.vertices(&mut scan)?;
-        reader.faces(&mut scan)?;
-        reader.soup.finish()
-    });
+    let read = Reader::begin(&mut scan, context).and_then(|reader| reader.elements(&mut scan));
     // A stopped text ends early; nothing that follows from its end is true.
     context.cancel.check()?;
     read
@@ -104,6 +100,8 @@ struct Reader<'a> {
     keyword: Keyword,
     vertices: usize,
     faces: usize,
+    /// Lines after the counts that are not blank, as far as they are needed.
+    lines: usize,
 }
 
 impl<'a> Reader<'a> {
@@ -144,12 +142,20 @@ impl<'a> Reader<'a> {
             keyword,
             vertices,
             faces,
+            lines: scan.content_lines(vertices + faces),
         })
     }
 
+    fn elements(mut self, scan: &mut Scanner<'a>) -> Result<TriangleSoup, MeshError> {
+        let (lines, elements) = (self.lines, self.vertices + self.faces);
+        self.vertices(scan)
+            .and_then(|()| self.faces(scan))
+            .map_err(|error| error.unless_cut_short(Format::Off, lines, elements))?;
+        self.soup.finish()
+    }
+
     fn vertices(&mut self, scan: &mut Scanner<'a>) -> Result<(), MeshError> {
-        let elements = self.vertices + self.faces;
-        let on_lines = scan.content_lines(elements) == elements;
+        let on_lines = self.lines == self.vertices + self.faces;
         for k in 0..self.vertices {
             let mut next = || {
                 scan_content(scan, "vertex", k, self.vertices)?

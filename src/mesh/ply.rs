@@ -42,18 +42,9 @@ fn read_elements(header: &Header, bytes: &[u8], context: &ReadContext) -> Result
         faces: 0,
     };
     for element in &header.elements {
-        match element.name.as_slice() {
-            b"vertex" => context.limits.check_vertices(element.count)?,
-            b"face" => context.limits.check_faces(element.count)?,
-            _ => {}
-        }
-        reader.payload.check(element)?;
-        match element.name.as_slice() {
-            b"vertex" => reader.vertices(element)?,
-            b"face" => reader.faces(element, Surface::Polygons)?,
-            b"tristrips" => reader.faces(element, Surface::Strips)?,
-            _ => reader.skip(element)?,
-        }
+        reader
+            .element(element)
+            .map_err(|error| reader.payload.explain(error))?;
     }
     if !header.elements.iter().any(|e| e.name == b"vertex") {
         return Err(malformed("its header has no `element vertex`"));
@@ -92,6 +83,21 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    fn element(&mut self, element: &Element) -> Result<(), MeshError> {
+        match element.name.as_slice() {
+            b"vertex" => self.context.limits.check_vertices(element.count)?,
+            b"face" => self.context.limits.check_faces(element.count)?,
+            _ => {}
+        }
+        self.payload.check(element)?;
+        match element.name.as_slice() {
+            b"vertex" => self.vertices(element),
+            b"face" => self.faces(element, Surface::Polygons),
+            b"tristrips" => self.faces(element, Surface::Strips),
+            _ => self.skip(element),
+        }
+    }
+
     fn skip(&mut self, element: &Element) -> Result<(), MeshError> {
         if element.properties.is_empty() {
             return Ok(());
@@ -174,7 +180,7 @@ impl Reader<'_> {
                 self.polygon.clear();
                 continue;
             }
-            if !(index.fract() == 0.0) {
+            if index.fract() != 0.0 {
                 return Err(malformed(format!(
                     "face {} refers to a vertex of number {index}",
                     self.faces

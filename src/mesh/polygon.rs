@@ -113,7 +113,8 @@ impl<'a> Triangulator<'a> {
             return Ok(());
         }
         let normal = self.normal(fan);
-        if !(dot(normal, normal) > 0.0) || self.is_inside(fan, normal) {
+        let has_area = dot(normal, normal) > 0.0;
+        if !has_area || self.is_inside(fan, normal) {
             return Ok(());
         }
         let n = fan.len() + 2;
@@ -152,10 +153,8 @@ impl<'a> Triangulator<'a> {
         let share = |p, q, r| dot(cross(sub(q, p), sub(r, p)), normal);
         let whole = dot(normal, normal);
         let fan = share(pa, pb, pc).min(share(pa, pc, pd));
-        if fan > 1e-6 * whole || !(whole > 0.0) {
-            return;
-        }
-        if share(pb, pc, pd).min(share(pb, pd, pa)) > fan {
+        let is_good = fan > 1e-6 * whole;
+        if !is_good && whole > 0.0 && share(pb, pc, pd).min(share(pb, pd, pa)) > fan {
             *first = [b, c, d];
             *second = [b, d, a];
         }

@@ -235,7 +235,7 @@ fn files_below_the_limits_are_read_in_time() {
     // 1.99 million vertices, 3.98 million triangles; the ascii STL of them is longer than the limit.
     for (format, binary) in FORMS {
         let side = if (format, binary) == (Format::Stl, false) {
-            1100
+            900
         } else {
             1410
         };

@@ -297,6 +297,13 @@ fn off_is_a_stream_of_words() {
         Format::Off,
         &["nOFF of 4 dimensions"],
     );
+    // Cut short: words of the colours must not be taken for the next face.
+    let cut = off("OFF\n6 8 0\n", " 255 0 0").replace("3 0 3 5 255 0 0\n", "");
+    assert_refused(
+        cut.as_bytes(),
+        Format::Off,
+        &["cut short"],
+    );
     assert_refused(b"OFF BINARY\n\0\0\0\x06", Format::Off, &["OFF BINARY"]);
     assert_refused(
         off("OFF\n6 8 0\n", "").replace("3 0 2 4", "3 0 2.5 4").as_bytes(),
@@ -346,6 +353,10 @@ fn ply_headers_and_rows() {
             .replace(" -1\n", " -1 77\n"),
     );
     // Faces before vertices.
+    let cut = ply("", "", "")
+        .replace(" 4\n", " 4 255 0\n")
+        .replace("3 0 3 5\n", "");
+    assert_refused(cut.as_bytes(), Format::Ply, &["cut short"]);
     let (head, body) = plain.split_once("end_header\n").expect("a header");
     let (vertices, faces) = body.split_at(body.find("3 0 2 4").expect("the first face"));
     let swapped = "ply\nformat ascii 1.0\nelement face 8\nproperty list uchar int vertex_indices\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\nend_header\n";

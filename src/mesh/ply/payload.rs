@@ -35,6 +35,9 @@ pub(super) enum Payload<'a> {
 pub(super) struct Rows<'a> {
     scan: Scanner<'a>,
     lines: Lines,
+    /// Lines that are not blank, at most one more than there are elements.
+    found: usize,
+    elements: usize,
 }
 
 fn truncated(detail: impl Into<String>) -> MeshError {
@@ -51,13 +54,27 @@ impl<'a> Payload<'a> {
                 let scan = Scanner::new(bytes).stopped_by(cancel);
                 let counts = header.elements.iter().filter(|e| !e.properties.is_empty());
                 let elements = counts.fold(0usize, |sum, e| sum.saturating_add(e.count));
-                let lines = match scan.content_lines(elements.saturating_add(1)).cmp(&elements) {
+                let found = scan.content_lines(elements.saturating_add(1));
+                let lines = match found.cmp(&elements) {
                     std::cmp::Ordering::Less => Lines::Blank,
                     std::cmp::Ordering::Equal => Lines::Elements,
                     std::cmp::Ordering::Greater => Lines::Broken,
                 };
-                Self::Ascii(Rows { scan, lines })
+                Self::Ascii(Rows {
+                    scan,
+                    lines,
+                    found,
+                    elements,
+                })
             }
+        }
+    }
+
+    /// What an error of the numbers means, given the number of lines.
+    pub fn explain(&self, error: MeshError) -> MeshError {
+        match self {
+            Self::Ascii(rows) => error.unless_cut_short(Format::Ply, rows.found, rows.elements),
+            Self::Little(_) | Self::Big(_) => error,
         }
     }
 

@@ -237,7 +237,8 @@ impl<'a> Plane<'a> {
         };
         let whole: f64 = (1..n - 1).map(|k| doubled(0, k, k + 1)).sum();
         let parts: f64 = triangles.iter().map(|&[a, b, c]| doubled(a, b, c).abs()).sum();
-        if !((parts - whole).abs() <= 1e-9 * whole) {
+        let is_covered = (parts - whole).abs() <= 1e-9 * whole;
+        if !is_covered {
             return false;
         }
         // Each edge once in each direction, or once along the border.
@@ -418,7 +419,7 @@ fn triangulate_monotone(piece: &mut [u32], plane: &Plane<'_>, triangles: &mut Ve
                     Chain::Lower => [a, b, corner],
                     Chain::Upper => [b, a, corner],
                 };
-                if !(plane.turn(p, q, r) > 0.0) {
+                if plane.turn(p, q, r) <= 0.0 {
                     break;
                 }
                 triangles.push([p, q, r]);

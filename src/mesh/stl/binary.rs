@@ -64,8 +64,11 @@ pub(super) fn read(bytes: &[u8], context: &ReadContext) -> Result<TriangleSoup, 
 
 /// The number of triangles, once the file has the size it demands.
 fn check_size(bytes: &[u8], context: &ReadContext) -> Result<usize, MeshError> {
+    // A count of four printable characters is above half a billion.
     let text = |b: &u8| matches!(b, b'\t' | b'\n' | b'\r' | b' '..);
-    if bytes.len() < HEADER || bytes[..HEADER].iter().all(text) {
+    let printable = |b: &u8| text(b) && b.is_ascii();
+    let is_text = || bytes[..80].iter().all(text) && bytes[80..HEADER].iter().all(printable);
+    if bytes.len() < HEADER || is_text() {
         let start = bytes
             .strip_prefix(b"\xef\xbb\xbf")
             .unwrap_or(bytes)
