@@ -11,7 +11,7 @@ const LIMITS: Limits = Limits {
 };
 
 /// Polygons with more corners are not looked at for crossings, which takes the square of their number.
-const CHECKED: usize = 300;
+const CHECKED: usize = 128;
 
 type Point = [f64; 2];
 

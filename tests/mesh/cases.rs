@@ -299,11 +299,7 @@ fn off_is_a_stream_of_words() {
     );
     // Cut short: words of the colours must not be taken for the next face.
     let cut = off("OFF\n6 8 0\n", " 255 0 0").replace("3 0 3 5 255 0 0\n", "");
-    assert_refused(
-        cut.as_bytes(),
-        Format::Off,
-        &["cut short"],
-    );
+    assert_refused(cut.as_bytes(), Format::Off, &["cut short"]);
     assert_refused(b"OFF BINARY\n\0\0\0\x06", Format::Off, &["OFF BINARY"]);
     assert_refused(
         off("OFF\n6 8 0\n", "").replace("3 0 2 4", "3 0 2.5 4").as_bytes(),
