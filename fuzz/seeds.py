@@ -187,6 +187,32 @@ def meshes(zoo):
             put("mesh_detect", f"{target}-{seed.name[5:]}", seed.read_bytes())
 
 
+def cases():
+    """The handed files of tests/data, and polygons: a byte that tilts them, then corners of two bytes."""
+    for path in sorted((CORPUS.parent.parent / "tests/data/mesh/cases").rglob("*.*")):
+        if path.stat().st_size < 20_000:
+            put(f"mesh_{path.suffix[1:]}", f"case-{path.stem}", path.read_bytes())
+    put("mesh_stl", "case-two-files", 2 * stl([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)] * 9))
+    put("mesh_stl", "case-words", "SOLID a\ncolor 1 2 3\nfacet normal nan -nan(ind) 1.#INF outer loop vertex 0 0 0 vertex 1 0 0\n"
+        "vertex 1 1 0 vertex 0 1 0 end loop end facet facet vertex 0 0 0 vertex 1 0 0 vertex 0 0 1 end solidname\n")
+    put("mesh_off", "case-stream", "STCN4nOFF 3 4\n2 0 0 0 1 " + "0 " * 9 + "1 0 0 2 " + "0 " * 9 + "0 1 0 1 " + "0 " * 9
+        + "0 0 1 1 " + "0 " * 9 + "3 0 1 2 4 0 1 2 3")
+    put("mesh_ply", "case-rows", "ply\nformat ascii 1.0\nelement vertex 2\nproperty int64 x\nproperty uint64 y\nproperty float z\n"
+        "element vertex 2\nproperty float z\nproperty float x\nproperty float x\nproperty float y\nelement tristrips 1\n"
+        "property list char int vertex_Index\nend_header \n0 0\n0\n1 0 0 9\n0 0 9 1\n1 0 0 0\n6 0 1 2 -1 1\n3\n")
+    comb = bytes(b for k in range(0, 250, 2) for b in (k, 1, k + 1, 250)) + bytes((250, 1, 250, 0, 0, 0))
+    spiral = [(0, 0), (9, 0), (9, 9), (2, 9), (2, 4), (5, 4), (5, 5), (3, 5), (3, 8), (8, 8), (8, 1), (1, 1), (1, 9), (0, 9)]
+    ring = [(0, 0), (9, 0), (9, 9), (0, 9), (0, 0), (2, 2), (2, 7), (7, 7), (7, 2), (2, 2)]
+    shapes = {"l": [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], "dart": [(0, 0), (2, 1), (0, 2), (1, 1)],
+              "star": [(5, 0), (2, 9), (9, 3), (0, 3), (7, 9)], "spiral": spiral, "ring": ring,
+              "straight": [(0, 0), (1, 0), (2, 0), (2, 2), (1, 2), (0, 2), (0, 1)], "spike": [(0, 0), (9, 0), (4, 0), (4, 4)]}
+    for name, points in shapes.items():
+        put("mesh_polygon", name, bytes((0, *(c for p in points for c in p))))
+        put("mesh_polygon", name + "-back", bytes((0x35, *(c for p in points[::-1] for c in p))))
+    put("mesh_polygon", "comb", b"\x21" + comb)
+    put("mesh_polygon", "comb-crossed", b"\x21" + comb + comb[:99])
+
+
 def zip_of(files, method=zipfile.ZIP_DEFLATED):
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", method) as archive:
@@ -271,6 +297,7 @@ def records(data):
 if __name__ == "__main__":
     if len(sys.argv) < 2:
         sys.exit(__doc__)
+    cases()
     meshes(sys.argv[1])
     archives()
     requests()

@@ -3,6 +3,7 @@
 #[cfg(feature = "service")]
 pub mod archive;
 pub mod mesh;
+pub mod polygon;
 #[cfg(feature = "service")]
 pub mod request;
 

@@ -123,6 +123,7 @@ fn inspect(
                 let prepared = TriangleSoup {
                     vertices: prepared.vertices().to_vec(),
                     faces: prepared.faces().to_vec(),
+                    ..TriangleSoup::default()
                 };
                 rows.push(GalleryRow {
                     view: RowView::Shared,

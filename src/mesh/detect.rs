@@ -1,101 +1,7 @@
 //! Which format the bytes are in: first by the bytes, then by the declared type, then by the name.
 
-use super::MeshError;
 use super::scan::Scanner;
-use serde::{Deserialize, Serialize};
-
-/// A mesh format shapelex reads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Format {
-    /// Wavefront OBJ.
-    Obj,
-    /// glTF 2.0, JSON.
-    Gltf,
-    /// glTF 2.0, binary container.
-    Glb,
-    /// Stanford PLY, ascii or binary.
-    Ply,
-    /// Stereolithography STL, ascii or binary.
-    Stl,
-    /// Object File Format.
-    Off,
-}
-
-impl std::fmt::Display for Format {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Obj => "OBJ",
-            Self::Gltf => "glTF",
-            Self::Glb => "GLB",
-            Self::Ply => "PLY",
-            Self::Stl => "STL",
-            Self::Off => "OFF",
-        })
-    }
-}
-
-impl Format {
-    /// All formats, in the order messages name them.
-    pub const ALL: [Self; 6] = [Self::Obj, Self::Gltf, Self::Glb, Self::Ply, Self::Stl, Self::Off];
-
-    /// The file name extension, lower case, without the dot.
-    pub fn extension(self) -> &'static str {
-        match self {
-            Self::Obj => "obj",
-            Self::Gltf => "gltf",
-            Self::Glb => "glb",
-            Self::Ply => "ply",
-            Self::Stl => "stl",
-            Self::Off => "off",
-        }
-    }
-
-    /// The media type files of this format are served as. IANA registers those of OBJ, glTF, GLB and STL; PLY and OFF
-    /// have none and get the obvious one.
-    pub fn media_type(self) -> &'static str {
-        match self {
-            Self::Obj => "model/obj",
-            Self::Gltf => "model/gltf+json",
-            Self::Glb => "model/gltf-binary",
-            Self::Ply => "model/ply",
-            Self::Stl => "model/stl",
-            Self::Off => "model/off",
-        }
-    }
-
-    /// The format a file name's extension tells, in any case: `Cat.OBJ` is OBJ. `None` for every other name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        let (stem, extension) = name.rsplit_once('.')?;
-        let file_name = stem.rsplit(['/', '\\']).next()?;
-        // `.obj` and `dir/.obj` are hidden files without an extension.
-        if file_name.is_empty() {
-            return None;
-        }
-        Self::ALL
-            .into_iter()
-            .find(|f| f.extension().eq_ignore_ascii_case(extension))
-    }
-
-    /// The format a media type tells, parameters such as `; charset=utf-8` aside. `None` for types that tell nothing,
-    /// such as `text/plain` and `application/octet-stream`.
-    pub fn from_media_type(media_type: &str) -> Option<Self> {
-        let essence = media_type.split(';').next()?.trim().to_ascii_lowercase();
-        Some(match essence.as_str() {
-            "model/obj" | "application/x-obj" | "text/obj" => Self::Obj,
-            "model/gltf+json" => Self::Gltf,
-            "model/gltf-binary" => Self::Glb,
-            "model/ply" | "application/ply" | "application/x-ply" | "text/ply" => Self::Ply,
-            "model/stl"
-            | "model/x.stl-ascii"
-            | "model/x.stl-binary"
-            | "application/sla"
-            | "application/vnd.ms-pki.stl" => Self::Stl,
-            "model/off" | "application/off" => Self::Off,
-            _ => return None,
-        })
-    }
-}
+use super::{Format, MeshError};
 
 /// Tells the format of a file: from its bytes if they are unmistakable, else from its declared media type, else from
 /// its name.
@@ -111,38 +17,35 @@ pub fn detect(bytes: &[u8], media_type: Option<&str>, name: Option<&str>) -> Res
         .ok_or(MeshError::UnknownFormat)
 }
 
+/// Bytes of a text that are looked at: nothing stops the look, so it must be short.
+const START: usize = 4 << 20;
+
 /// The format the bytes alone tell, or `None`. A start that is unmistakable counts even if the rest is broken; a
 /// truncated binary STL and an OBJ without vertices are not recognised.
 pub fn from_bytes(bytes: &[u8]) -> Option<Format> {
     if bytes.starts_with(b"glTF") {
         return Some(Format::Glb);
     }
-    if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
+    if super::ply::has_magic(bytes) {
         return Some(Format::Ply);
     }
     // Before any text: the header of a binary STL is free and often begins with `solid`.
     if super::stl::is_binary(bytes) {
         return Some(Format::Stl);
     }
-    let mut text = Scanner::new(bytes);
+    let start = &bytes[..bytes.len().min(START)];
+    let mut text = Scanner::new(start);
     if text.skip_whitespace() && text.peek() == Some(b'{') {
-        return contains(bytes, b"\"asset\"").then_some(Format::Gltf);
+        let asset = memchr::memmem::find(bytes, b"\"asset\"");
+        return asset.map(|_| Format::Gltf);
     }
-    let head = &text.rest()[..text.remaining().min(4096)];
-    if head.len() >= 5 && head[..5].eq_ignore_ascii_case(b"solid") {
-        let lower = head.to_ascii_lowercase();
-        if contains(&lower, b"facet") || contains(&lower, b"endsolid") {
-            return Some(Format::Stl);
-        }
+    if super::stl::is_text(start) {
+        return Some(Format::Stl);
     }
-    if super::off::has_keyword(bytes) {
+    if super::off::has_keyword(start) {
         return Some(Format::Off);
     }
-    is_obj(bytes).then_some(Format::Obj)
-}
-
-fn contains(haystack: &[u8], needle: &[u8]) -> bool {
-    haystack.windows(needle.len()).any(|w| w == needle)
+    is_obj(start).then_some(Format::Obj)
 }
 
 /// Statements an OBJ file may hold before its first vertex, or instead of one in a broken file.
@@ -221,27 +124,5 @@ mod tests {
             Err(MeshError::UnknownFormat)
         );
         assert_eq!(detect(b"OFFICE", None, None), Err(MeshError::UnknownFormat));
-    }
-
-    #[test]
-    fn names_and_types_round_trip() {
-        for format in Format::ALL {
-            assert_eq!(Format::from_media_type(format.media_type()), Some(format));
-            assert_eq!(
-                Format::from_name(&format!("dir.x/cat.{}", format.extension())),
-                Some(format)
-            );
-        }
-        for name in [
-            ".obj",
-            "dir/.obj",
-            "obj",
-            "cat.obj.zip",
-            "",
-            "cat.",
-            "dir.obj/cat",
-        ] {
-            assert_eq!(Format::from_name(name), None, "{name}");
-        }
     }
 }

@@ -83,6 +83,24 @@ impl MeshError {
         }
     }
 
+    /// What an error of words means where the file has `lines` lines for more `elements`, nearly one for each: its end
+    /// is missing, and words were taken for what they are not.
+    pub(super) fn unless_cut_short(self, format: Format, lines: usize, elements: usize) -> Self {
+        match self {
+            Self::Malformed { .. } | Self::IndexOutOfRange { .. }
+                if lines < elements && lines > elements / 2 =>
+            {
+                Self::truncated(
+                    format,
+                    format!(
+                        "its header promises {elements} elements, but only {lines} lines follow ({self})"
+                    ),
+                )
+            }
+            other => other,
+        }
+    }
+
     /// A [`MeshError::Truncated`] with these words.
     pub(super) fn truncated(format: Format, detail: impl Into<String>) -> Self {
         Self::Truncated {

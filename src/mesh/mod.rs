@@ -1,6 +1,7 @@
 //! Bytes → a clean triangle mesh.
 
 pub mod boundary;
+mod builder;
 pub mod clean;
 pub mod components;
 pub mod context;
@@ -9,6 +10,7 @@ pub mod detect;
 pub mod double;
 pub mod edges;
 pub mod error;
+pub mod format;
 pub mod gltf;
 pub mod holes;
 pub mod limits;
@@ -18,9 +20,12 @@ pub mod off;
 pub mod orient;
 mod pieces;
 pub mod ply;
+mod polygon;
+mod precision;
 pub mod prepare;
 pub mod read;
 pub mod refine;
+mod reserved;
 mod scan;
 pub mod soup;
 pub mod stl;
@@ -30,8 +35,8 @@ pub mod weld;
 pub mod whiten;
 
 pub use context::ReadContext;
-pub use detect::Format;
 pub use error::MeshError;
+pub use format::Format;
 pub use limits::Limits;
 pub use prepare::{Components, PrepareOptions, PrepareReport, prepare, prepare_until};
 pub use read::{Companion, Pose, Source, read, read_poses, read_poses_within, read_within};

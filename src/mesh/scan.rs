@@ -1,11 +1,32 @@
 //! Walks over the words and lines of ASCII mesh files without copying them.
 
+use super::precision::Decimal;
+use crate::cancel::Cancel;
+
+/// Bytes walked over between two looks at the stop flag: well below a millisecond.
+const BLOCK: usize = 1 << 18;
+
+/// Longest number read, in bytes.
+const LONGEST_NUMBER: usize = 1024;
+
+/// What a backslash before a line end means.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Backslash {
+    Text,
+    /// The statement continues on the next line (OBJ).
+    Continues,
+}
+
 /// A position in a text. Blanks are spaces, tabs and other control characters but line feeds and carriage returns,
 /// either of which ends a line (so a CRLF file has an empty line after each, which every caller skips).
-#[derive(Clone, Debug)]
+///
+/// Once the stop flag is set, the text ends here: a reader asks the flag before it believes in a text cut short.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Scanner<'a> {
     bytes: &'a [u8],
     at: usize,
+    cancel: Option<&'a Cancel>,
+    backslash: Backslash,
 }
 
 fn ends_line(byte: u8) -> bool {
@@ -17,10 +38,31 @@ fn is_blank(byte: u8) -> bool {
 }
 
 impl<'a> Scanner<'a> {
+    /// The start of a text, after its byte-order mark.
     pub fn new(bytes: &'a [u8]) -> Self {
-        // A byte-order mark is not part of the text.
         let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
-        Self { bytes, at }
+        Self {
+            bytes,
+            at,
+            cancel: None,
+            backslash: Backslash::Text,
+        }
+    }
+
+    /// The same position; the text ends as soon as `cancel` is set.
+    pub fn stopped_by(self, cancel: &'a Cancel) -> Self {
+        Self {
+            cancel: Some(cancel),
+            ..self
+        }
+    }
+
+    /// The same position; a backslash that ends a line counts as a blank together with the line end, but in a comment.
+    pub fn with_continued_lines(self) -> Self {
+        Self {
+            backslash: Backslash::Continues,
+            ..self
+        }
     }
 
     /// Bytes not yet read.
@@ -39,15 +81,55 @@ impl<'a> Scanner<'a> {
     }
 
     /// The next byte, not consumed.
+    #[inline]
     pub fn peek(&self) -> Option<u8> {
         self.bytes.get(self.at).copied()
+    }
+
+    /// Steps over `count` bytes, at most to the end.
+    pub fn advance(&mut self, count: usize) {
+        self.at = (self.at + count).min(self.bytes.len());
+    }
+
+    /// Goes to the end of the text if a stop was asked for.
+    pub fn look_at_cancel(&mut self) {
+        if self.cancel.is_some_and(Cancel::is_cancelled) {
+            self.at = self.bytes.len();
+        }
+    }
+
+    #[inline]
+    fn skip_while(&mut self, skipped: impl Fn(u8) -> bool) {
+        // Most runs have a byte or two.
+        while self.peek().is_some_and(&skipped) {
+            self.at += 1;
+            if self.at.is_multiple_of(BLOCK) {
+                self.look_at_cancel();
+            }
+        }
+    }
+
+    /// Bytes of a backslash with the line end after it, if it continues the line.
+    #[inline]
+    fn continuation(&self) -> Option<usize> {
+        if self.backslash == Backslash::Text || self.peek() != Some(b'\\') {
+            return None;
+        }
+        match &self.bytes[self.at + 1..] {
+            [b'\r', b'\n', ..] => Some(3),
+            [b'\n' | b'\r', ..] => Some(2),
+            [] => Some(1),
+            _ => None,
+        }
     }
 
     /// Steps over blanks, staying on the line.
     #[inline]
     pub fn skip_blanks(&mut self) {
-        while self.peek().is_some_and(is_blank) {
-            self.at += 1;
+        self.skip_while(is_blank);
+        while let Some(length) = self.continuation() {
+            self.at += length;
+            self.skip_while(is_blank);
         }
     }
 
@@ -61,14 +143,35 @@ impl<'a> Scanner<'a> {
     /// Goes to the start of the next line.
     #[inline]
     pub fn next_line(&mut self) {
-        let rest = &self.bytes[self.at..];
-        self.at += rest
-            .iter()
-            .position(|&b| ends_line(b))
-            .map_or(rest.len(), |k| k + 1);
+        let start = self.at;
+        loop {
+            self.look_at_cancel();
+            let block = &self.bytes[self.at..self.bytes.len().min(self.at + BLOCK)];
+            if block.is_empty() {
+                return;
+            }
+            let Some(k) = memchr::memchr2(b'\n', b'\r', block) else {
+                self.at += block.len();
+                continue;
+            };
+            let end = self.at + k;
+            self.at = end + 1;
+            let continued = self.backslash == Backslash::Continues
+                && end > start
+                && self.bytes[end - 1] == b'\\'
+                && memchr::memchr(b'#', &self.bytes[start..end]).is_none();
+            if !continued {
+                return;
+            }
+            // The line feed of a CRLF belongs to the line end that was continued.
+            if self.bytes[end] == b'\r' && self.peek() == Some(b'\n') {
+                self.at += 1;
+            }
+        }
     }
 
     /// Goes to the next word, over blank lines and comments; false at the end of the text.
+    #[inline]
     pub fn next_content(&mut self) -> bool {
         while !self.at_end() {
             if !self.line_done() {
@@ -80,64 +183,98 @@ impl<'a> Scanner<'a> {
     }
 
     /// Steps over blanks and line ends, comments being text; false at the end of the text.
+    #[inline]
     pub fn skip_whitespace(&mut self) -> bool {
-        while self.peek().is_some_and(|b| b <= b' ') {
-            self.at += 1;
-        }
+        self.skip_while(|b| b <= b' ');
         !self.at_end()
     }
 
-    /// Reads the word here, up to the next blank or line end.
+    /// Reads the word here, up to the next blank, comment or line end.
     pub fn word(&mut self) -> &'a [u8] {
         self.skip_blanks();
         self.word_rest()
     }
 
+    /// Whether no further byte of a word is here.
+    #[inline]
+    pub fn word_done(&self) -> bool {
+        self.peek().is_none_or(|b| b <= b' ' || b == b'#') || self.continuation().is_some()
+    }
+
     /// Reads from inside a word to its end; empty if it ends here.
     #[inline]
     pub fn word_rest(&mut self) -> &'a [u8] {
-        let rest = &self.bytes[self.at..];
-        let length = rest.iter().position(|&b| b <= b' ').unwrap_or(rest.len());
-        self.at += length;
-        &rest[..length]
+        let start = self.at;
+        while !self.word_done() {
+            self.at += 1;
+            if self.at.is_multiple_of(BLOCK) {
+                self.look_at_cancel();
+            }
+        }
+        &self.bytes[start..self.at]
     }
 
     /// Reads a number standing alone on this line; `None`, with nothing consumed but blanks, if there is none.
-    /// `nan` and `inf` are numbers here: the caller refuses them by their vertex.
+    ///
+    /// `nan` and `inf` are numbers here, in the spellings of C libraries too (`-nan(ind)`, `1.#QNAN`): the caller
+    /// refuses them by their vertex. A number ends at a blank, a line end, or a comment.
     #[inline]
-    pub fn number(&mut self) -> Option<f64> {
+    pub fn decimal(&mut self) -> Option<Decimal> {
         self.skip_blanks();
-        let (value, length) = fast_float2::parse_partial::<f64, _>(&self.bytes[self.at..]).ok()?;
-        let after = self.bytes.get(self.at + length);
-        if after.is_some_and(|&b| b > b' ' && b != b'#') {
+        let rest = &self.bytes[self.at..self.bytes.len().min(self.at + LONGEST_NUMBER)];
+        let Ok((value, length)) = fast_float2::parse_partial::<f64, _>(rest) else {
             return None;
+        };
+        let end = Self {
+            at: self.at + length,
+            ..*self
+        };
+        // `1.#INF` is no number with a comment after it.
+        let ended = length < LONGEST_NUMBER && end.word_done();
+        if !ended || (end.peek() == Some(b'#') && rest[length - 1] == b'.') {
+            return self.spelled_not_finite();
         }
         self.at += length;
-        Some(value)
+        Some(Decimal::written(&rest[..length], value))
+    }
+
+    /// As [`decimal`](Self::decimal), the value alone.
+    #[inline]
+    pub fn number(&mut self) -> Option<f64> {
+        self.decimal().map(|d| d.value)
+    }
+
+    /// Reads what C libraries print for a value that is no finite number: `nan(ind)`, `1.#IND`, `1.#INF00`.
+    #[cold]
+    fn spelled_not_finite(&mut self) -> Option<Decimal> {
+        let rest = &self.bytes[self.at..self.bytes.len().min(self.at + 32)];
+        let length = rest.iter().position(|&b| b <= b' ').unwrap_or(rest.len());
+        let word = rest[..length].to_ascii_lowercase();
+        let unsigned = word
+            .strip_prefix(b"-")
+            .or(word.strip_prefix(b"+"))
+            .unwrap_or(&word);
+        let letters = |b: &[u8]| b.first().is_some_and(u8::is_ascii_alphabetic);
+        let spelled = (unsigned.starts_with(b"nan(") && unsigned.ends_with(b")"))
+            || unsigned.strip_prefix(b"1.#").is_some_and(letters);
+        spelled.then(|| {
+            self.at += length;
+            Decimal::exact(f64::NAN)
+        })
     }
 
     /// Reads an integer, whatever follows it; `None` if there is none or it has more than 18 digits.
     #[inline]
     pub fn integer(&mut self) -> Option<i64> {
         self.skip_blanks();
-        let mut at = self.at;
-        let negative = match self.bytes.get(at) {
-            Some(b'-') => true,
-            Some(b'+') => false,
-            _ => {
-                at = at.wrapping_sub(1);
-                false
-            }
-        };
-        at = at.wrapping_add(1);
-        let start = at;
+        let sign = self.peek().filter(|b| matches!(b, b'-' | b'+'));
+        let start = self.at + usize::from(sign.is_some());
+        let mut at = start;
         let mut value = 0i64;
-        while let Some(digit) = self
-            .bytes
-            .get(at)
-            .map(|b| b.wrapping_sub(b'0'))
-            .filter(|&d| d < 10)
-        {
+        while let Some(digit) = self.bytes.get(at).map(|b| b.wrapping_sub(b'0')) {
+            if digit > 9 {
+                break;
+            }
             if at - start >= 18 {
                 return None;
             }
@@ -148,33 +285,70 @@ impl<'a> Scanner<'a> {
             return None;
         }
         self.at = at;
-        Some(if negative { -value } else { value })
+        Some(if sign == Some(b'-') { -value } else { value })
+    }
+
+    /// Reads an integer with nothing after it in its word; `None`, with nothing consumed but blanks, if there is none.
+    #[inline]
+    pub fn whole_integer(&mut self) -> Option<i64> {
+        let start = *self;
+        let value = self.integer()?;
+        if !self.word_done() {
+            self.at = start.at;
+            return None;
+        }
+        Some(value)
+    }
+
+    /// How many of the following lines hold more than blanks and comments, this one included, counted up to `enough`.
+    pub fn content_lines(&self, enough: usize) -> usize {
+        let mut scan = *self;
+        let mut lines = 0;
+        while lines < enough && scan.next_content() {
+            lines += 1;
+            scan.next_line();
+        }
+        lines
     }
 
     /// The line number here, counted from 1. Costs a pass over the text: for messages only.
     pub fn line_number(&self) -> usize {
         let before = &self.bytes[..self.at];
-        let feeds = before.iter().filter(|&&b| b == b'\n').count();
-        let returns = before.iter().filter(|&&b| b == b'\r').count();
-        1 + if feeds == 0 { returns } else { feeds }
+        let feeds = memchr::memchr_iter(b'\n', before).count();
+        if feeds > 0 {
+            return 1 + feeds;
+        }
+        1 + memchr::memchr_iter(b'\r', before).count()
     }
 
-    /// The line here, shortened and printable, for messages.
+    /// The rest of the line here, shortened and printable, for messages.
     pub fn excerpt(&self) -> String {
-        let rest = self.rest();
-        let end = rest.iter().position(|&b| ends_line(b)).unwrap_or(rest.len());
-        let shown = &rest[..end.min(40)];
-        let text: String = shown
-            .iter()
-            .map(|&b| {
-                if (b' '..=b'~').contains(&b) {
-                    b as char
-                } else {
-                    '?'
-                }
-            })
-            .collect();
-        if end > 40 { format!("{text}…") } else { text }
+        excerpt(self.rest())
+    }
+
+    /// The line here by number and text, for messages: ``line 7, `f 1 2 x` ``.
+    pub fn place(&self) -> String {
+        format!("line {}, `{}`", self.line_number(), self.excerpt())
+    }
+}
+
+/// The first line of a text, shortened and printable, for messages.
+pub(super) fn excerpt(text: &[u8]) -> String {
+    const LENGTH: usize = 40;
+    let start = &text[..text.len().min(LENGTH + 1)];
+    let end = start.iter().position(|&b| ends_line(b)).unwrap_or(start.len());
+    let printable = |&b: &u8| {
+        if (b' '..=b'~').contains(&b) {
+            b as char
+        } else {
+            '?'
+        }
+    };
+    let shown: String = start[..end.min(LENGTH)].iter().map(printable).collect();
+    if end > LENGTH {
+        format!("{shown}…")
+    } else {
+        shown
     }
 }
 
@@ -204,8 +378,79 @@ mod tests {
 
     #[test]
     fn a_number_with_letters_after_it_is_none() {
-        assert_eq!(Scanner::new(b"12abc").number(), None);
-        assert_eq!(Scanner::new(b"").number(), None);
+        for text in [
+            "12abc",
+            "",
+            "0x1p3",
+            "1,5",
+            "1.5.2",
+            "1.#",
+            "1.# comment",
+            "2.#IND",
+            "nan(",
+            "--1",
+            "1e5f",
+        ] {
+            assert_eq!(Scanner::new(text.as_bytes()).number(), None, "{text}");
+        }
         assert_eq!(Scanner::new(b"-").integer(), None);
+        assert_eq!(Scanner::new(b"12abc").whole_integer(), None);
+        assert_eq!(Scanner::new("9".repeat(5000).as_bytes()).number(), None);
+    }
+
+    #[test]
+    fn c_libraries_spell_what_is_not_finite_in_many_ways() {
+        for text in [
+            "nan",
+            "-NaN",
+            "nan(ind)",
+            "-nan(snan)",
+            "NAN(0x7)",
+            "1.#IND",
+            "-1.#IND00",
+            "1.#QNAN",
+            "1.#SNAN",
+            "-1.#INF",
+            "1.#J",
+            "inf",
+            "-Infinity",
+        ] {
+            let padded = format!("{text} 7");
+            let mut scan = Scanner::new(padded.as_bytes());
+            assert!(scan.number().is_some_and(|x| !x.is_finite()), "{text}");
+            assert_eq!(scan.number(), Some(7.0), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_backslash_continues_a_line_but_not_a_comment() {
+        let text = b"f 1 2\\\n3 \\\r\n4\n# c:\\\nv\\\r1\\";
+        let mut s = Scanner::new(text).with_continued_lines();
+        assert_eq!(s.word(), b"f");
+        for k in 1..5 {
+            assert!(!s.line_done());
+            assert_eq!(s.integer(), Some(k));
+        }
+        assert!(s.line_done());
+        assert!(s.next_content());
+        assert_eq!(s.word(), b"v");
+        assert_eq!(s.number(), Some(1.0));
+        assert!(s.line_done());
+        let mut s = Scanner::new(text).with_continued_lines();
+        s.next_line();
+        assert_eq!(s.excerpt(), "# c:\\");
+        assert_eq!(Scanner::new(b"\n#a\n b\r\nc").content_lines(9), 2);
+    }
+
+    #[test]
+    fn a_stopped_text_ends() {
+        let cancel = Cancel::new();
+        cancel.cancel();
+        let text = [b' '; 2 * BLOCK];
+        let mut scan = Scanner::new(&text).stopped_by(&cancel);
+        scan.next_line();
+        assert!(scan.at_end());
+        let mut scan = Scanner::new(&text).stopped_by(&cancel);
+        assert!(!scan.skip_whitespace());
     }
 }

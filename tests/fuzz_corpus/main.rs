@@ -4,6 +4,8 @@
 mod archive;
 #[path = "../../fuzz/src/mesh.rs"]
 mod mesh;
+#[path = "../../fuzz/src/polygon.rs"]
+mod polygon;
 #[path = "../../fuzz/src/request.rs"]
 mod request;
 
@@ -37,6 +39,11 @@ fn meshes_of_every_format() {
         });
     }
     replay("mesh_detect", |bytes| mesh::check(bytes, None));
+}
+
+#[test]
+fn polygons() {
+    replay("mesh_polygon", polygon::check);
 }
 
 #[test]

@@ -171,6 +171,25 @@ pub const CASES: &[fn() -> Case] = &[
             "mesh_too_large",
         )
     },
+    || {
+        (
+            "OBJ of one face with 30 million corners",
+            "model/obj",
+            long_face(" 1"),
+            413,
+            "mesh_too_large",
+        )
+    },
+    || {
+        (
+            "OBJ of one face on 30 million lines",
+            "model/obj",
+            long_face("\\\n"),
+            422,
+            "mesh_too_small",
+        )
+    },
+    || ("two STL in one", "model/stl", two_stl(), 422, "malformed_mesh"),
     || ("3000 triangles", "model/off", triangles(), 422, "mesh_too_small"),
     || ("one place", "model/off", coincident(), 422, "degenerate_mesh"),
 ];
@@ -180,6 +199,21 @@ fn stl(promised: u32) -> Vec<u8> {
     bytes.extend(promised.to_le_bytes());
     bytes.extend([0u8; 500]);
     bytes
+}
+
+fn two_stl() -> Vec<u8> {
+    let mut bytes = vec![b' '; 80];
+    bytes.extend(100_000u32.to_le_bytes());
+    bytes.resize(bytes.len() + 5_000_000, 0);
+    [bytes.as_slice(), &bytes].concat()
+}
+
+fn long_face(filling: &str) -> Vec<u8> {
+    format!(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1{} 2 3\n",
+        filling.repeat(30_000_000)
+    )
+    .into_bytes()
 }
 
 fn ply(kind: &str, promised: usize) -> Vec<u8> {
