@@ -6,7 +6,7 @@ use super::refused::Refused;
 use super::{CliError, api, dictionaries, output};
 use crate::cancel::Cancel;
 use crate::http::dto::parameters::QueryRankByName;
-use crate::mesh::{Limits, read};
+use crate::mesh::{Limits, ReadContext, read_within};
 use crate::pipeline::{describe_query, rank_top};
 use crate::ranking::Index;
 use serde::Deserialize;
@@ -117,8 +117,10 @@ fn rank_against(
         }
     };
     let cancel = Cancel::new();
-    let (format, soup) = read(&file.source(), limits)?;
-    let description = describe_query(soup, &index.parameters, &cancel, &|_| ())?;
+    let context = ReadContext::new(*limits);
+    let (format, soup) = read_within(&file.source(), &context)?;
+    let mut description = describe_query(soup, &index.parameters, &cancel, &|_| ())?;
+    description.report.warnings.splice(0..0, context.warnings.list());
     let ranking = rank_top(&description.views, index, rank_by, top, &cancel)
         .map_err(crate::pipeline::PipelineError::from)?;
     let classes: Vec<Value> = ranking

@@ -29,7 +29,7 @@ pub mod trimesh;
 pub mod weld;
 pub mod whiten;
 
-pub use context::ReadContext;
+pub use context::{ReadContext, Warnings};
 pub use detect::Format;
 pub use error::MeshError;
 pub use limits::Limits;

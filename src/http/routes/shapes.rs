@@ -13,7 +13,7 @@ use crate::http::problem::{Code, Problem};
 use crate::http::state::Parts;
 use crate::http::upload;
 use crate::http::uploaded::UploadedMesh;
-use crate::mesh::{Limits, PrepareOptions, prepare};
+use crate::mesh::{Limits, PrepareOptions, ReadContext, prepare};
 use crate::model::{Class, ClassName, NewShape, Shape, ShapeId, ShapePose};
 use crate::store::{AddedShape, StoreError};
 use axum::Json;
@@ -180,24 +180,31 @@ fn check_one(
     options: &PrepareOptions,
     cancel: &crate::cancel::Cancel,
 ) -> Result<Vec<NewShape>, Problem> {
+    let context = ReadContext {
+        cancel: cancel.clone(),
+        ..ReadContext::new(*limits)
+    };
+    // Shared by all poses.
+    let companions = mesh.companions();
     let shape = |format, pose, soup| -> Result<NewShape, Problem> {
         let stopped = |c: crate::cancel::Cancelled| Problem::new(Code::Cancelled, c.to_string());
         cancel.check().map_err(stopped)?;
-        let (_, report) = prepare(soup, options)?;
+        let (_, mut report) = prepare(soup, options)?;
+        report.warnings.splice(0..0, context.warnings.list());
         Ok(NewShape {
             name: Some(mesh.name.clone()),
             bytes: mesh.bytes.clone(),
-            companions: mesh.companions(),
+            companions: companions.clone(),
             format,
             pose,
             report,
         })
     };
     let Some(wanted) = poses else {
-        let (format, soup) = mesh.read(limits)?;
+        let (format, soup) = mesh.read(&context)?;
         return Ok(vec![shape(format, None, soup)?]);
     };
-    let (format, found) = mesh.read_poses(wanted, limits)?;
+    let (format, found) = mesh.read_poses(wanted, &context)?;
     let of = found.len();
     found
         .into_iter()
@@ -221,7 +228,7 @@ fn store(
     shapes: Vec<NewShape>,
 ) -> Result<(Class, Vec<AddedShape>), Problem> {
     let _alone = parts.catalogue.lock().unwrap_or_else(PoisonError::into_inner);
-    let bytes = |s: &NewShape| s.bytes.len() + s.companions.iter().map(|c| c.bytes.len()).sum::<usize>();
+    let bytes = |s: &NewShape| s.bytes.len() + s.companions.iter().map(|c| c.bytes().len()).sum::<usize>();
     let bytes = shapes.iter().map(bytes).sum::<usize>() as u64;
     parts.limits.check_quota(parts, caller, 0, bytes)?;
     let found = match find_class(&parts.store, class) {
