@@ -3,6 +3,7 @@
 mod benchmark;
 mod commands;
 mod configuration;
+mod gltf;
 mod keys;
 mod readme;
 mod service;

@@ -13,7 +13,9 @@ fn read_case(name: &str) -> Result<TriangleSoup, MeshError> {
     let companions: Vec<Companion> = external_buffers(&bytes)
         .iter()
         .filter_map(|uri| {
-            let contents = uri.candidates().find_map(|p| std::fs::read(folder.join(p)).ok())?;
+            let contents = uri
+                .candidates()
+                .find_map(|p| std::fs::read(folder.join(p)).ok())?;
             Some(Companion::new(uri.path(), contents))
         })
         .collect();
@@ -124,9 +126,21 @@ fn what_has_no_shape_may_be_anything() {
         g["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(99);
         g["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!("u");
     });
-    for extras in [json!("note"), json!(1.5), json!([1]), json!(null), json!({"a": {"b": []}})] {
+    for extras in [
+        json!("note"),
+        json!(1.5),
+        json!([1]),
+        json!(null),
+        json!({"a": {"b": []}}),
+    ] {
         unchanged("extras", |g| {
-            for (list, k) in [("nodes", 0), ("meshes", 0), ("accessors", 1), ("bufferViews", 0), ("scenes", 0)] {
+            for (list, k) in [
+                ("nodes", 0),
+                ("meshes", 0),
+                ("accessors", 1),
+                ("bufferViews", 0),
+                ("scenes", 0),
+            ] {
                 g[list][k]["extras"] = extras.clone();
             }
             g["extras"] = extras.clone();
@@ -148,12 +162,21 @@ fn what_has_no_shape_may_be_anything() {
         g["scene"] = json!(0.0);
     });
     unchanged("elements that nothing refers to", |g| {
-        g["accessors"].as_array_mut().expect("a list").push(json!({"count": "many"}));
+        g["accessors"]
+            .as_array_mut()
+            .expect("a list")
+            .push(json!({"count": "many"}));
         g["bufferViews"].as_array_mut().expect("a list").push(json!(5));
-        g["meshes"].as_array_mut().expect("a list").push(json!({"primitives": 1}));
+        g["meshes"]
+            .as_array_mut()
+            .expect("a list")
+            .push(json!({"primitives": 1}));
         g["skins"] = json!([{"joints": "all"}]);
         g["animations"] = json!([{"channels": [{}], "samplers": [1]}, 3]);
-        g["scenes"].as_array_mut().expect("a list").push(json!({"nodes": "x"}));
+        g["scenes"]
+            .as_array_mut()
+            .expect("a list")
+            .push(json!({"nodes": "x"}));
     });
 }
 
@@ -163,7 +186,10 @@ fn names_may_be_no_text_at_all() {
     let named = |name: &str| text.replace("\"mesh\":0", &format!("\"mesh\":0,\"name\":\"{name}\""));
     assert_ne!(named("x"), text);
     for name in ["\\ud800", "\\udc00 \\ud83d", "a\\u0000b"] {
-        assert_eq!(corners(&read(named(name).as_bytes()).expect(name).1), tetra_corners());
+        assert_eq!(
+            corners(&read(named(name).as_bytes()).expect(name).1),
+            tetra_corners()
+        );
     }
     let mut latin = named("?").into_bytes();
     let at = latin.iter().position(|b| *b == b'?').expect("the name");
@@ -226,8 +252,13 @@ fn data_uris_in_every_spelling() {
         let found = read(&gltf.with_uri(&uri)).unwrap_or_else(|error| panic!("{uri}: {error}"));
         assert_eq!(corners(&found.1), tetra_corners(), "{uri}");
     }
-    let escaped = String::from_utf8(gltf.with_uri(&plain)).expect("JSON").replace('/', "\\/");
-    assert_eq!(corners(&read(escaped.as_bytes()).expect("escapes").1), tetra_corners());
+    let escaped = String::from_utf8(gltf.with_uri(&plain))
+        .expect("JSON")
+        .replace('/', "\\/");
+    assert_eq!(
+        corners(&read(escaped.as_bytes()).expect("escapes").1),
+        tetra_corners()
+    );
 }
 
 #[test]
@@ -249,7 +280,11 @@ fn glb_chunks_paddings_and_tails() {
     expect("an unknown chunk in the middle", &sized(with(json_end, unknown)));
     expect("an unknown chunk at the beginning", &sized(with(12, unknown)));
     expect("an empty chunk", &sized(with(json_end, b"\0\0\0\0XTRA")));
-    for tail in [&b"\n"[..], b"\0\0\0\0\0\0\0\0\0\0", b"trailing words of any length"] {
+    for tail in [
+        &b"\n"[..],
+        b"\0\0\0\0\0\0\0\0\0\0",
+        b"trailing words of any length",
+    ] {
         expect("bytes after the file", &with(glb.len(), tail));
     }
     for generator in ["", "a", "bc", "def"] {
@@ -267,7 +302,10 @@ fn glb_chunks_paddings_and_tails() {
     expect("a length without the binary chunk", &wrong_length);
     let text = Gltf::tetra().embedded();
     expect("NULs and a newline after JSON", &[&text[..], b"\0\0\n"].concat());
-    expect("a byte order mark before JSON", &[b"\xef\xbb\xbf", &text[..]].concat());
+    expect(
+        "a byte order mark before JSON",
+        &[b"\xef\xbb\xbf", &text[..]].concat(),
+    );
 }
 
 #[test]
@@ -275,11 +313,16 @@ fn vertices_are_counted_as_they_are_used() {
     // A library of 150 000 vertices, of which each of 30 meshes uses three.
     let mut gltf = Gltf::new();
     let many = 150_000;
-    let positions: Vec<f64> = (0..many).flat_map(|k| [f64::from(k), f64::from(k % 7), 1.0]).collect();
+    let positions: Vec<f64> = (0..many)
+        .flat_map(|k| [f64::from(k), f64::from(k % 7), 1.0])
+        .collect();
     let positions = gltf.floats("VEC3", &positions);
     let mut meshes = Vec::new();
     for k in 0..30u32 {
-        let bytes: Vec<u8> = [k, k + 1000, k + 140_000].iter().flat_map(|i| i.to_le_bytes()).collect();
+        let bytes: Vec<u8> = [k, k + 1000, k + 140_000]
+            .iter()
+            .flat_map(|i| i.to_le_bytes())
+            .collect();
         let indices = gltf.accessor("SCALAR", 5125, 3, &bytes);
         meshes.push(json!({"primitives": [{"attributes": {"POSITION": positions}, "indices": indices}]}));
     }
@@ -289,7 +332,10 @@ fn vertices_are_counted_as_they_are_used() {
     let bytes = gltf.glb();
     let soup = read(&bytes).expect("30 triangles").1;
     assert_eq!((soup.vertices.len(), soup.faces.len()), (90, 30));
-    assert_eq!(corners(&soup)[29], [[29.0, 1.0, 1.0], [1029.0, 0.0, 1.0], [140_029.0, 1.0, 1.0]]);
+    assert_eq!(
+        corners(&soup)[29],
+        [[29.0, 1.0, 1.0], [1029.0, 0.0, 1.0], [140_029.0, 1.0, 1.0]]
+    );
     // More vertices than a mesh may have, as long as faces do not use them.
     let limits = Limits {
         max_vertices: 90,
@@ -305,7 +351,17 @@ fn vertices_are_counted_as_they_are_used() {
         ..limits
     };
     let refused = shapelex::mesh::read(&source, &limits).expect_err("one more than allowed");
-    assert!(matches!(refused, MeshError::TooLarge { what: "vertices", found: 90, .. }), "{refused}");
+    assert!(
+        matches!(
+            refused,
+            MeshError::TooLarge {
+                what: "vertices",
+                found: 90,
+                ..
+            }
+        ),
+        "{refused}"
+    );
     // One that no face uses need not be a number.
     let mut gltf = Gltf::tetra();
     let mut positions = VERTICES.concat();
@@ -329,7 +385,10 @@ fn messages_say_what_happened_and_what_to_do() {
     for asset in [json!({"version": "1.0"}), json!({"version": "1.1"})] {
         gltf.json["asset"] = asset;
         let refused = message(&gltf.glb());
-        assert!(refused.contains("needs glTF 1.0") && refused.contains("export it as glTF 2.0"), "{refused}");
+        assert!(
+            refused.contains("needs glTF 1.0") && refused.contains("export it as glTF 2.0"),
+            "{refused}"
+        );
     }
     let named = br#"{"scene": "s", "meshes": {"mesh_1": {"primitives": []}}, "buffers": {}}"#;
     assert!(message(named).contains("glTF 1.0"));
@@ -337,10 +396,16 @@ fn messages_say_what_happened_and_what_to_do() {
     old[4] = 1;
     assert!(message(&old).contains("glTF 1.0"));
     let missing = message(&Gltf::tetra().with_uri("a%20b.bin"));
-    assert!(missing.contains("'a%20b.bin'") && missing.contains("beside the file"), "{missing}");
+    assert!(
+        missing.contains("'a%20b.bin'") && missing.contains("beside the file"),
+        "{missing}"
+    );
     let error = message(&{
         let mut gltf = Gltf::tetra();
-        gltf.json["accessors"][0].as_object_mut().expect("an object").remove("count");
+        gltf.json["accessors"][0]
+            .as_object_mut()
+            .expect("an object")
+            .remove("count");
         gltf.glb()
     });
     assert!(error.ends_with("accessor 0: missing field `count`"), "{error}");
@@ -377,28 +442,56 @@ fn instances_count_as_one_copy_with_a_warning_and_hidden_nodes_are_left_out() {
 #[test]
 fn broken_compression_is_refused() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/mesh/cases/gltf");
-    for name in ["draco_edgebreaker.glb", "meshopt_plain.glb", "meshopt_khr_animated.glb"] {
+    for name in [
+        "draco_edgebreaker.glb",
+        "meshopt_plain.glb",
+        "meshopt_khr_animated.glb",
+    ] {
         let bytes = std::fs::read(folder.join(name)).expect("a case");
         let json = 20 + u32::from_le_bytes([bytes[12], bytes[13], bytes[14], bytes[15]]) as usize;
         // The stream's first byte names the codec and its version.
         let mut broken = bytes.clone();
         broken[json + 8] ^= 0xff;
         let error = read(&broken).expect_err(name);
-        assert!(matches!(error, MeshError::Malformed { format: Format::Glb, .. }), "{name}: {error}");
+        assert!(
+            matches!(
+                error,
+                MeshError::Malformed {
+                    format: Format::Glb,
+                    ..
+                }
+            ),
+            "{name}: {error}"
+        );
         assert!(error.to_string().contains("compression"), "{name}: {error}");
     }
     let replace = |name: &str, from: &str, to: &str| {
         let bytes = std::fs::read(folder.join(name)).expect("a case");
         assert_eq!(from.len(), to.len());
-        let at = bytes.windows(from.len()).position(|w| w == from.as_bytes()).expect(from);
+        let at = bytes
+            .windows(from.len())
+            .position(|w| w == from.as_bytes())
+            .expect(from);
         let mut changed = bytes.clone();
         changed[at..at + to.len()].copy_from_slice(to.as_bytes());
         read(&changed).expect_err(to).to_string()
     };
-    let mode = replace("meshopt_plain.glb", "\"mode\":\"ATTRIBUTES\"", "\"mode\":\"ATTRACTION\"");
+    let mode = replace(
+        "meshopt_plain.glb",
+        "\"mode\":\"ATTRIBUTES\"",
+        "\"mode\":\"ATTRACTION\"",
+    );
     assert!(mode.contains("unknown mode `ATTRACTION`"), "{mode}");
-    let stride = replace("meshopt_plain.glb", "\"byteStride\":12,\"count\"", "\"byteStride\":13,\"count\"");
+    let stride = replace(
+        "meshopt_plain.glb",
+        "\"byteStride\":12,\"count\"",
+        "\"byteStride\":13,\"count\"",
+    );
     assert!(stride.contains("258 elements of 13 bytes"), "{stride}");
-    let faces = replace("draco_edgebreaker.glb", "\"count\":1536", "\"count\":9999999999999999"[..12].trim_end());
+    let faces = replace(
+        "draco_edgebreaker.glb",
+        "\"count\":1536",
+        "\"count\":9999999999999999"[..12].trim_end(),
+    );
     assert!(faces.contains("faces") || faces.contains("Draco"), "{faces}");
 }

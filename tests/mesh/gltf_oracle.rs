@@ -19,9 +19,8 @@ type Matrix = [[f64; 4]; 4];
 
 fn visit(node: &gltf::Node<'_>, parent: &Matrix, blob: Option<&[u8]>, triangles: &mut Vec<[[f64; 3]; 3]>) {
     let local = node.transform().matrix().map(|column| column.map(f64::from));
-    let global: Matrix = std::array::from_fn(|c| {
-        std::array::from_fn(|r| (0..4).map(|k| parent[k][r] * local[c][k]).sum())
-    });
+    let global: Matrix =
+        std::array::from_fn(|c| std::array::from_fn(|r| (0..4).map(|k| parent[k][r] * local[c][k]).sum()));
     for primitive in node.mesh().iter().flat_map(|m| m.primitives()) {
         let reader = primitive.reader(|_| blob);
         let points: Vec<[f64; 3]> = reader
@@ -34,7 +33,11 @@ fn visit(node: &gltf::Node<'_>, parent: &Matrix, blob: Option<&[u8]>, triangles:
             Some(indices) => indices.into_u32().collect(),
             None => (0..points.len() as u32).collect(),
         };
-        triangles.extend(corners.chunks_exact(3).map(|f| std::array::from_fn(|k| points[f[k] as usize])));
+        triangles.extend(
+            corners
+                .chunks_exact(3)
+                .map(|f| std::array::from_fn(|k| points[f[k] as usize])),
+        );
     }
     for child in node.children() {
         visit(&child, &global, blob, triangles);
@@ -46,7 +49,12 @@ fn assert_equal(what: &str, gltf: &Gltf) {
     let ours = corners(&read(&bytes).unwrap_or_else(|error| panic!("{what}: {error}")).1);
     let theirs = by_the_crate(&bytes);
     assert_eq!(ours.len(), theirs.len(), "{what}");
-    for (a, b) in ours.iter().flatten().flatten().zip(theirs.iter().flatten().flatten()) {
+    for (a, b) in ours
+        .iter()
+        .flatten()
+        .flatten()
+        .zip(theirs.iter().flatten().flatten())
+    {
         assert!((a - b).abs() <= 1e-5 * (1.0 + b.abs()), "{what}: {a} and {b}");
     }
 }
@@ -88,7 +96,10 @@ fn two_readers_agree_on_valid_files() {
     let mut sparse = Gltf::tetra();
     bounded(&mut sparse);
     let at = sparse.view(&[1, 3]);
-    let values: Vec<u8> = [9f32, 8.0, 7.0, 6.0, 5.0, 4.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let values: Vec<u8> = [9f32, 8.0, 7.0, 6.0, 5.0, 4.0]
+        .iter()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
     let values = sparse.view(&values);
     sparse.json["accessors"][0]["sparse"] = json!({
         "count": 2, "indices": {"bufferView": at, "componentType": 5121}, "values": {"bufferView": values},
@@ -99,7 +110,11 @@ fn two_readers_agree_on_valid_files() {
     bounded(&mut interleaved);
     let bytes: Vec<u8> = VERTICES
         .iter()
-        .flat_map(|v| [7.0, v[0], v[1], v[2], 0.0].into_iter().flat_map(|x| (x as f32).to_le_bytes()))
+        .flat_map(|v| {
+            [7.0, v[0], v[1], v[2], 0.0]
+                .into_iter()
+                .flat_map(|x| (x as f32).to_le_bytes())
+        })
         .collect();
     let view = interleaved.view(&bytes);
     interleaved.json["bufferViews"][view]["byteStride"] = 20.into();

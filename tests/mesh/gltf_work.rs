@@ -56,7 +56,11 @@ fn a_stop_is_seen_within_a_tenth_of_a_second() {
         let result = shapelex::mesh::read_within(&source(&bytes), &context);
         let returned = Instant::now();
         let set = stop.join().expect("a thread that sets the flag");
-        assert!(matches!(result, Err(MeshError::Cancelled(_))), "{:?}", result.err());
+        assert!(
+            matches!(result, Err(MeshError::Cancelled(_))),
+            "{:?}",
+            result.err()
+        );
         returned.saturating_duration_since(set)
     });
     let best = stopped_after.min().expect("attempts");
@@ -86,7 +90,10 @@ fn products_are_refused_before_they_are_worked_out() {
     gltf.json["accessors"][1]["name"] = "x".repeat(100_000).into();
     let primitive = gltf.primitive().clone();
     gltf.json["meshes"][0]["primitives"] = vec![primitive; 60_000].into();
-    assert_eq!(steps("primitives × text", &gltf.glb(), None), "steps of reading its JSON");
+    assert_eq!(
+        steps("primitives × text", &gltf.glb(), None),
+        "steps of reading its JSON"
+    );
 
     // A clip of 60 000 channels with 100 000 keys each.
     let mut gltf = Gltf::tetra();
@@ -99,8 +106,13 @@ fn products_are_refused_before_they_are_worked_out() {
         .map(|_| json!({"bufferView": view, "componentType": 5126, "type": "SCALAR", "count": 100_000}))
         .collect();
     let first = gltf.json["accessors"].as_array().expect("a list").len();
-    gltf.json["accessors"].as_array_mut().expect("a list").extend(inputs);
-    let samplers: Vec<Value> = (0..60_000).map(|k| json!({"input": first + k, "output": values})).collect();
+    gltf.json["accessors"]
+        .as_array_mut()
+        .expect("a list")
+        .extend(inputs);
+    let samplers: Vec<Value> = (0..60_000)
+        .map(|k| json!({"input": first + k, "output": values}))
+        .collect();
     let channels: Vec<Value> = (0..60_000)
         .map(|k| json!({"sampler": k, "target": {"node": 0, "path": "translation"}}))
         .collect();
@@ -115,10 +127,18 @@ fn products_are_refused_before_they_are_worked_out() {
         "componentType": 5126, "type": "VEC3", "count": 2_000_000,
         "sparse": {"count": 1, "indices": {"bufferView": at, "componentType": 5121}, "values": {"bufferView": values}},
     });
-    let primitives: Vec<Value> = (2..1002).map(|k| json!({"attributes": {"POSITION": k}, "indices": 1})).collect();
-    gltf.json["accessors"].as_array_mut().expect("a list").extend(vec![sparse; 1000]);
+    let primitives: Vec<Value> = (2..1002)
+        .map(|k| json!({"attributes": {"POSITION": k}, "indices": 1}))
+        .collect();
+    gltf.json["accessors"]
+        .as_array_mut()
+        .expect("a list")
+        .extend(vec![sparse; 1000]);
     gltf.json["meshes"][0]["primitives"] = primitives.into();
-    assert_eq!(steps("sparse accessors", &gltf.glb(), None), "bytes in sparse accessors");
+    assert_eq!(
+        steps("sparse accessors", &gltf.glb(), None),
+        "bytes in sparse accessors"
+    );
 }
 
 #[test]

@@ -55,7 +55,10 @@ enum Data<'s> {
     /// Dense numbers with the sparse ones put in.
     Merged { numbers: Vec<f64>, _kept: Kept<'s> },
     /// Decoded from a Draco stream, in the accessor's component type.
-    Decoded { numbers: Vec<f32>, _kept: Option<Kept<'s>> },
+    Decoded {
+        numbers: Vec<f32>,
+        _kept: Option<Kept<'s>>,
+    },
 }
 
 /// An accessor that was checked: every element below `count` can be read.
@@ -273,28 +276,6 @@ impl<'d> Document<'d> {
                 limit,
             });
         }
-        let changed = usize::try_from(sparse.count.0).unwrap_or(usize::MAX);
-        if changed > count {
-            return Err(self.malformed(format!("{what}: {changed} sparse values for {count} elements")));
-        }
-        let Checked::Valid(index_type) = &sparse.indices.component_type else {
-            return Err(self.malformed(format!("{what}: unknown type of sparse indices")));
-        };
-        let (index_type, width) = (index_type.0, dense.component.size());
-        let indices = self.elements(
-            sparse.indices.buffer_view,
-            sparse.indices.byte_offset,
-            changed,
-            index_type.size(),
-            what,
-        )?;
-        let values = self.elements(
-            sparse.values.buffer_view,
-            sparse.values.byte_offset,
-            changed,
-            components * width,
-            what,
-        )?;
         let kept = self.keep(8 * length, "bytes in sparse accessors")?;
         self.work.spend(length, 1, SPARSE)?;
         let mut numbers = vec![0.0; length];
@@ -306,6 +287,30 @@ impl<'d> Document<'d> {
                 }
             }
         }
+        self.put_in(dense, sparse, &mut numbers, what)?;
+        Ok(Data::Merged { numbers, _kept: kept })
+    }
+
+    /// Puts the sparse numbers in their places.
+    fn put_in(
+        &self,
+        dense: &Column<'_>,
+        sparse: &schema::Sparse,
+        numbers: &mut [f64],
+        what: &str,
+    ) -> Result<(), MeshError> {
+        let (count, components) = (dense.count, dense.components);
+        let changed = usize::try_from(sparse.count.0).unwrap_or(usize::MAX);
+        if changed > count {
+            return Err(self.malformed(format!("{what}: {changed} sparse values for {count} elements")));
+        }
+        let Checked::Valid(index_type) = &sparse.indices.component_type else {
+            return Err(self.malformed(format!("{what}: unknown type of sparse indices")));
+        };
+        let (index_type, width) = (index_type.0, dense.component.size());
+        let (at, of) = (&sparse.indices, &sparse.values);
+        let indices = self.elements(at.buffer_view, at.byte_offset, changed, index_type.size(), what)?;
+        let values = self.elements(of.buffer_view, of.byte_offset, changed, components * width, what)?;
         for k in 0..changed {
             if k % BLOCK == 0 {
                 self.work.spend(BLOCK.min(changed - k) * components, 8, SPARSE)?;
@@ -319,7 +324,7 @@ impl<'d> Document<'d> {
                 *slot = dense.value(decode(dense.component, b));
             }
         }
-        Ok(Data::Merged { numbers, _kept: kept })
+        Ok(())
     }
 }
 

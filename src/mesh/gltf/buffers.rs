@@ -14,6 +14,10 @@ use std::borrow::Cow;
 use std::cell::{Cell, OnceCell, RefCell};
 use std::collections::BTreeSet;
 
+/// Characters of base64 that are decoded between two looks at the stop flag: whole groups of four.
+const BASE64_PIECE: usize = 1 << 20;
+const DECODING: &str = "steps of decoding its data URIs";
+
 /// Bytes that were unpacked, and the memory that is reserved for them.
 struct Unpacked<'d> {
     bytes: Vec<u8>,
@@ -78,7 +82,7 @@ impl<'d> Buffers<'d> {
         self.context.limits.max_bytes / 8 * 3
     }
 
-    /// Counts bytes about to be unpacked and reserves memory for them, `copies` times while it lasts.
+    /// Counts bytes about to be unpacked and reserves memory for them.
     pub fn reserve_unpacked(&self, bytes: usize) -> Result<Held<'d>, MeshError> {
         let (unpacked, limit) = (self.unpacked.get().saturating_add(bytes), self.unpacked_limit());
         if unpacked > limit {
@@ -237,8 +241,7 @@ impl<'d> Document<'d> {
             true => data.len() / 4 * 3 + 3,
             false => data.len(),
         })?;
-        self.work
-            .spend(data.len(), 3, "steps of decoding its data URIs")?;
+        self.work.spend(data.len(), 1, DECODING)?;
         // A copy is made only of text that is not base64 alone.
         let clean = !data.bytes().any(|b| b == b'%' || b.is_ascii_whitespace());
         let _copy = match clean {
@@ -247,8 +250,7 @@ impl<'d> Document<'d> {
         };
         let text = uri::percent_decode(data.as_bytes());
         let bytes = match base64 {
-            true => decode_base64(text)
-                .map_err(|error| self.malformed(format!("buffer {index}: its data URI: {error}")))?,
+            true => self.decode_base64(index, text)?,
             false => text.into_owned(),
         };
         Ok(Unpacked {
@@ -256,25 +258,32 @@ impl<'d> Document<'d> {
             _memory: memory,
         })
     }
-}
 
-/// Base64 in either alphabet, with or without padding, broken into lines or not.
-fn decode_base64(text: Cow<'_, [u8]>) -> Result<Vec<u8>, base64::DecodeError> {
-    let text: Cow<'_, [u8]> = if text.iter().any(u8::is_ascii_whitespace) {
-        text.iter()
-            .copied()
-            .filter(|b| !b.is_ascii_whitespace())
-            .collect()
-    } else {
-        text
-    };
-    let lenient = GeneralPurposeConfig::new()
-        .with_decode_padding_mode(DecodePaddingMode::Indifferent)
-        .with_decode_allow_trailing_bits(true);
-    let alphabet = if text.iter().any(|&b| b == b'-' || b == b'_') {
-        &URL_SAFE
-    } else {
-        &STANDARD
-    };
-    GeneralPurpose::new(alphabet, lenient).decode(&text)
+    /// Base64 in either alphabet, with or without padding, broken into lines or not.
+    fn decode_base64(&self, index: usize, text: Cow<'_, [u8]>) -> Result<Vec<u8>, MeshError> {
+        let text: Cow<'_, [u8]> = match text.iter().any(u8::is_ascii_whitespace) {
+            true => text
+                .iter()
+                .copied()
+                .filter(|b| !b.is_ascii_whitespace())
+                .collect(),
+            false => text,
+        };
+        let lenient = GeneralPurposeConfig::new()
+            .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+            .with_decode_allow_trailing_bits(true);
+        let alphabet = match text.iter().any(|&b| b == b'-' || b == b'_') {
+            true => &URL_SAFE,
+            false => &STANDARD,
+        };
+        let engine = GeneralPurpose::new(alphabet, lenient);
+        let mut bytes = Vec::with_capacity(text.len() / 4 * 3 + 3);
+        for piece in text.chunks(BASE64_PIECE) {
+            self.work.spend(piece.len(), 3, DECODING)?;
+            engine
+                .decode_vec(piece, &mut bytes)
+                .map_err(|error| self.malformed(format!("buffer {index}: its data URI: {error}")))?;
+        }
+        Ok(bytes)
+    }
 }

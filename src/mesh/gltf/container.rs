@@ -73,8 +73,8 @@ fn known(bytes: &[u8], at: usize) -> bool {
     chunk(bytes, at).is_some_and(|(kind, ..)| kind == JSON || kind == BINARY)
 }
 
-/// The JSON and binary chunks of a GLB.
-fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), MeshError> {
+/// The length that a GLB's header promises, at most that of the file.
+fn promised_length(bytes: &[u8]) -> Result<usize, MeshError> {
     if !bytes.starts_with(b"glTF") {
         return Err(MeshError::malformed(
             Format::Glb,
@@ -104,6 +104,12 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), MeshError> {
             format!("its header promises {length} bytes, but it has {}", bytes.len()),
         ));
     }
+    Ok(length)
+}
+
+/// The JSON and binary chunks of a GLB.
+fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), MeshError> {
+    let length = promised_length(bytes)?;
     let (mut json, mut binary) = (None, None);
     let mut at = HEADER;
     while let Some((kind, contents, mut next)) = chunk(bytes, at) {

@@ -16,7 +16,7 @@ const MAX_OBJECTS: usize = 400_000;
 const MAX_VALUES: usize = 4_000_000;
 /// Bytes that the lists of a document take, with what is kept of their elements, per object and per value of the text:
 /// a node's state and its place in the hierarchy, the index of a child or a joint.
-const BYTES_PER_OBJECT: u64 = 96;
+const BYTES_PER_OBJECT: u64 = 240;
 const BYTES_PER_VALUE: u64 = 8;
 
 /// Extensions that are read where they are required.

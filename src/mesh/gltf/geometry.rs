@@ -78,6 +78,27 @@ impl<'s> Drafts<'s> {
     }
 }
 
+/// What a primitive draws whose triangles are in a Draco stream.
+fn plan_stream<'s>(
+    document: &'s Document<'_>,
+    draco: &schema::Draco,
+    declared: &Declared,
+    sources: Sources,
+    drafts: &mut Drafts<'s>,
+) -> Result<Plan, MeshError> {
+    let stream = Decoded::open(document, draco, declared)?;
+    let open = |sources: &Sources| Draft::decoded(document, sources, &stream, &draco.attributes);
+    let draft = drafts.add(sources, open)?;
+    let faces = stream.faces();
+    Ok(Plan {
+        mode: Mode::Triangles,
+        draft,
+        indices: None,
+        listed: 3 * faces.len(),
+        decoded: Some(faces),
+    })
+}
+
 impl<'s> Geometry<'s> {
     /// Reads a mesh, its morph targets aside.
     pub fn open(document: &'s Document<'_>, index: usize) -> Result<Self, MeshError> {
@@ -152,18 +173,8 @@ impl<'s> Geometry<'s> {
                 faces: listed.unwrap_or_default() / 3,
                 vertices: document.count(&vertices),
             };
-            let stream = Decoded::open(document, draco, &declared)?;
             let sources = Sources::of(primitive, position, Some(draco.buffer_view));
-            let open = |sources: &Sources| Draft::decoded(document, sources, &stream, &draco.attributes);
-            let draft = drafts.add(sources, open)?;
-            let faces = stream.faces();
-            return Ok(Some(Plan {
-                mode: Mode::Triangles,
-                draft,
-                indices: None,
-                listed: 3 * faces.len(),
-                decoded: Some(faces),
-            }));
+            return plan_stream(document, draco, &declared, sources, drafts).map(Some);
         }
         let sources = Sources::of(primitive, position, None);
         let draft = drafts.add(sources, |sources| Draft::open(document, sources))?;
@@ -249,7 +260,6 @@ impl<'s> Geometry<'s> {
             let declared = draft.positions.count;
             let count = 3 * ranges.iter().map(|r| r.len()).sum::<usize>();
             let memory = document.context.memory.hold(Used::bytes(count, declared))?;
-            document.work.spend(count, 12, "steps of reading its faces")?;
             let indices = ranges
                 .iter()
                 .flat_map(|r| self.faces[(*r).clone()].as_flattened());
@@ -258,8 +268,13 @@ impl<'s> Geometry<'s> {
                 .limits
                 .check_vertices((base as usize).saturating_add(used.len()))?;
             for range in ranges {
-                for face in &mut self.faces[range.clone()] {
-                    *face = face.map(|k| base + used.place(k));
+                for block in self.faces[range.clone()].chunks_mut(BLOCK) {
+                    document
+                        .work
+                        .spend(block.len(), 36, "steps of reading its faces")?;
+                    for face in block {
+                        *face = face.map(|k| base + used.place(k));
+                    }
                 }
             }
             base += used.len() as u32;

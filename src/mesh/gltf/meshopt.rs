@@ -150,11 +150,12 @@ impl Layout {
         macro_rules! by_stride {
             ($($words:literal)*) => {
                 match self.stride / 4 {
-                    $($words => Ok(decode::<Element<$words>>(stream, self.count)?
-                        .iter()
-                        .flat_map(|e| e.0.as_flattened())
-                        .copied()
-                        .collect()),)*
+                    $($words => {
+                        let elements = decode::<Element<$words>>(stream, self.count)?;
+                        let mut bytes = Vec::with_capacity(self.bytes());
+                        elements.iter().for_each(|e| bytes.extend_from_slice(e.0.as_flattened()));
+                        Ok(bytes)
+                    })*
                     _ => Err(format!("meshopt compression of elements of {} bytes", self.stride)),
                 }
             };

@@ -190,6 +190,24 @@ impl<'s, 'd> Scene<'s, 'd> {
         Ok(vertices)
     }
 
+    /// The matrices of the joints that the instances of one skin follow; none where there is no skin.
+    fn joints(&self, group: &[usize], globals: &[Matrix]) -> Result<Vec<Matrix>, MeshError> {
+        let of_group = || group.iter().map(|k| &self.instances[*k]);
+        let Some(skin) = of_group().next().and_then(|i| i.skin).map(|s| &self.skins[&s]) else {
+            return Ok(Vec::new());
+        };
+        let parts = of_group().flat_map(|i| &self.meshes[&i.mesh].parts);
+        let tops = parts.filter_map(|p| p.influences.as_ref()).filter_map(|i| i.top);
+        let top = tops.max().unwrap_or(0);
+        if skin.len() > 0 && usize::from(top) >= skin.len() {
+            return Err(self.document.malformed(format!(
+                "a vertex follows joint {top} of a skin with {} joints",
+                skin.len()
+            )));
+        }
+        skin.matrices(self.document, globals, top)
+    }
+
     /// Places the instances that follow one skin, or none.
     fn place_group(
         &self,
@@ -200,25 +218,7 @@ impl<'s, 'd> Scene<'s, 'd> {
     ) -> Result<(), MeshError> {
         let document = self.document;
         let of_group = || group.iter().map(|k| &self.instances[*k]);
-        let skin = of_group().next().and_then(|i| i.skin).map(|s| &self.skins[&s]);
-        let parts = of_group().flat_map(|i| &self.meshes[&i.mesh].parts);
-        let top = parts
-            .filter_map(|p| p.influences.as_ref())
-            .filter_map(|i| i.top)
-            .max();
-        let joints = match skin {
-            Some(skin) => {
-                let top = top.unwrap_or(0);
-                if skin.len() > 0 && usize::from(top) >= skin.len() {
-                    return Err(document.malformed(format!(
-                        "a vertex follows joint {top} of a skin with {} joints",
-                        skin.len()
-                    )));
-                }
-                skin.matrices(document, globals, top)?
-            }
-            None => Vec::new(),
-        };
+        let joints = self.joints(group, globals)?;
         let _joints = document.context.memory.hold(MATRIX * joints.len() as u64)?;
         let mut morphs = Morphs::default();
         for instance in of_group() {
