@@ -22,6 +22,7 @@ mod document;
 mod draco;
 mod geometry;
 mod influences;
+mod list;
 mod matrix;
 mod meshopt;
 mod nodes;
@@ -31,6 +32,7 @@ mod schema;
 mod skin;
 mod uri;
 mod used;
+mod view;
 mod work;
 
 pub use uri::{BufferUri, external_buffers};

@@ -391,7 +391,8 @@ fn messages_say_what_happened_and_what_to_do() {
         );
     }
     let named = br#"{"scene": "s", "meshes": {"mesh_1": {"primitives": []}}, "buffers": {}}"#;
-    assert!(message(named).contains("glTF 1.0"));
+    let named = read_as(named, Some(Format::Gltf)).expect_err("lists by name");
+    assert!(named.to_string().contains("glTF 1.0"), "{named}");
     let mut old = Gltf::tetra().glb();
     old[4] = 1;
     assert!(message(&old).contains("glTF 1.0"));
@@ -488,10 +489,4 @@ fn broken_compression_is_refused() {
         "\"byteStride\":13,\"count\"",
     );
     assert!(stride.contains("258 elements of 13 bytes"), "{stride}");
-    let faces = replace(
-        "draco_edgebreaker.glb",
-        "\"count\":1536",
-        "\"count\":9999999999999999"[..12].trim_end(),
-    );
-    assert!(faces.contains("faces") || faces.contains("Draco"), "{faces}");
 }

@@ -3,9 +3,18 @@
 use crate::mesh::{Format, MeshError};
 use std::borrow::Cow;
 
-const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 const JSON: &[u8] = b"JSON";
 const BINARY: &[u8] = b"BIN\0";
+/// Most JSON objects in one document.
+const MAX_OBJECTS: usize = 400_000;
+/// Most JSON values in one document, by its commas.
+const MAX_VALUES: usize = 4_000_000;
+/// Bytes that the lists of a document take, with what is kept of their elements, per object and per value of the text:
+/// a node's state and its place in the hierarchy, the index of a child or a joint.
+const BYTES_PER_OBJECT: u64 = 240;
+const BYTES_PER_VALUE: u64 = 8;
+
 /// Bytes of a GLB's header, and of a chunk's.
 const HEADER: usize = 12;
 const CHUNK_HEADER: usize = 8;
@@ -47,6 +56,23 @@ impl<'a> Container<'a> {
             }
         };
         Ok(Self { format, json, binary })
+    }
+}
+
+impl Container<'_> {
+    /// An upper bound of the memory that the document's lists take, or the refusal of one with too many parts.
+    pub fn check_counts(&self) -> Result<u64, MeshError> {
+        let count = |byte: u8| self.json.bytes().filter(|b| *b == byte).count();
+        let (objects, values) = (count(b'{'), count(b','));
+        for (what, found, limit) in [
+            ("JSON objects", objects, MAX_OBJECTS),
+            ("JSON values", values, MAX_VALUES),
+        ] {
+            if found > limit {
+                return Err(MeshError::TooLarge { what, found, limit });
+            }
+        }
+        Ok(objects as u64 * BYTES_PER_OBJECT + values as u64 * BYTES_PER_VALUE)
     }
 }
 

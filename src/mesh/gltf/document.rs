@@ -2,6 +2,7 @@
 
 use super::buffers::Buffers;
 use super::container::Container;
+use super::list::{List, reason};
 use super::schema::{Asset, Index, Top, text};
 use super::work::Work;
 use crate::memory::Held;
@@ -9,15 +10,6 @@ use crate::mesh::{Format, Limits, MeshError, ReadContext, Source};
 use serde::Deserialize;
 use serde_json::value::RawValue;
 use std::cell::Cell;
-
-/// Most JSON objects in one document.
-const MAX_OBJECTS: usize = 400_000;
-/// Most JSON values in one document, by its commas.
-const MAX_VALUES: usize = 4_000_000;
-/// Bytes that the lists of a document take, with what is kept of their elements, per object and per value of the text:
-/// a node's state and its place in the hierarchy, the index of a child or a joint.
-const BYTES_PER_OBJECT: u64 = 240;
-const BYTES_PER_VALUE: u64 = 8;
 
 /// Extensions that are read where they are required.
 const READ: [&str; 6] = [
@@ -80,19 +72,6 @@ fn accepted(extension: &str) -> bool {
         || HARMLESS_SUBJECTS.iter().any(|s| subject.starts_with(s))
 }
 
-/// A list of the document, its elements still text.
-pub(super) struct List<'t> {
-    /// What an element is called in messages.
-    name: &'static str,
-    elements: Vec<&'t RawValue>,
-}
-
-impl<'t> List<'t> {
-    pub fn len(&self) -> usize {
-        self.elements.len()
-    }
-}
-
 /// A document, with access to its buffers.
 pub(super) struct Document<'d> {
     pub format: Format,
@@ -123,12 +102,12 @@ impl<'d> Document<'d> {
         context: &'d ReadContext,
     ) -> Result<Self, MeshError> {
         let format = container.format;
-        let bytes = check_counts(&container.json)?;
+        let bytes = container.check_counts()?;
         let memory = context.memory.hold(bytes)?;
         let top = top(format, &container.json)?;
         let malformed = |detail: String| MeshError::malformed(format, detail);
-        let list = |name, raw: Option<&'d RawValue>| list(name, raw).map_err(malformed);
-        let required: Vec<&RawValue> = list("required extension", top.extensions_required)?.elements;
+        let list = |name, raw: Option<&'d RawValue>| List::parse(name, raw).map_err(malformed);
+        let required: Vec<&RawValue> = list("required extension", top.extensions_required)?.into_elements();
         if let Some(extension) = required.into_iter().filter_map(text).find(|e| !accepted(e)) {
             return Err(MeshError::Unsupported {
                 format,
@@ -161,7 +140,7 @@ impl<'d> Document<'d> {
 
     /// The animations; only poses need them.
     pub fn animations(&self) -> Result<List<'d>, MeshError> {
-        list("animation", self.animations).map_err(|detail| self.malformed(detail))
+        List::parse("animation", self.animations).map_err(|detail| self.malformed(detail))
     }
 
     /// A [`MeshError::Malformed`] of this document.
@@ -180,34 +159,19 @@ impl<'d> Document<'d> {
         // An element that is referred to very often is parsed as often.
         self.work.spend(raw.get().len(), 2, "steps of reading its JSON")?;
         serde_json::from_str(raw.get())
-            .map_err(|error| self.malformed(format!("{} {index}: {}", list.name, reason(&error))))
+            .map_err(|error| self.malformed(format!("{} {index}: {}", list.name(), reason(&error))))
     }
 
     /// The text of element `index` of a list.
     pub fn element(&self, list: &List<'d>, index: usize) -> Result<&'d RawValue, MeshError> {
-        list.elements.get(index).copied().ok_or_else(|| {
+        list.elements().get(index).copied().ok_or_else(|| {
             self.malformed(format!(
                 "it refers to {} {index}, but has {} of them",
-                list.name,
+                list.name(),
                 list.len()
             ))
         })
     }
-}
-
-/// An upper bound of the memory that a document's lists take, or the refusal of one with too many parts.
-fn check_counts(json: &str) -> Result<u64, MeshError> {
-    let count = |byte: u8| json.bytes().filter(|b| *b == byte).count();
-    let (objects, values) = (count(b'{'), count(b','));
-    for (what, found, limit) in [
-        ("JSON objects", objects, MAX_OBJECTS),
-        ("JSON values", values, MAX_VALUES),
-    ] {
-        if found > limit {
-            return Err(MeshError::TooLarge { what, found, limit });
-        }
-    }
-    Ok(objects as u64 * BYTES_PER_OBJECT + values as u64 * BYTES_PER_VALUE)
 }
 
 /// The top level of a document of glTF 2.
@@ -233,31 +197,6 @@ fn top(format: Format, json: &str) -> Result<Top<'_>, MeshError> {
         });
     }
     Ok(top)
-}
-
-/// A list, each element as text.
-fn list<'t>(name: &'static str, raw: Option<&'t RawValue>) -> Result<List<'t>, String> {
-    let elements = match raw {
-        Some(raw) => {
-            serde_json::from_str(raw.get()).map_err(|e| format!("its list of {name}s: {}", reason(&e)))?
-        }
-        None => Vec::new(),
-    };
-    Ok(List { name, elements })
-}
-
-/// What is wrong, without the position in a text that the caller does not see.
-fn reason(error: &serde_json::Error) -> String {
-    let text = error.to_string();
-    let end = text.rfind(" at line ").unwrap_or(text.len());
-    text[..end].to_owned()
-}
-
-impl<'t> List<'t> {
-    /// The list's elements, still text.
-    pub fn elements(&self) -> &[&'t RawValue] {
-        &self.elements
-    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! This is the one place where the names of external buffers are read; the command line, multipart requests and
 //! archives look for files by what [`external_buffers`] lists, and the reader finds them by the same rules.
 
-use super::container::Container;
+use super::container::{BYTE_ORDER_MARK, Container};
 use super::schema::{Buffer, Top, text};
 use crate::mesh::Format;
 use serde_json::value::RawValue;
@@ -74,16 +74,19 @@ impl BufferUri {
 
 /// The files a glTF document refers to, each once, in the order of their paths; none where the bytes are no glTF.
 pub fn external_buffers(bytes: &[u8]) -> Vec<BufferUri> {
+    let document = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     let format = if bytes.starts_with(b"glTF") {
         Format::Glb
-    } else {
+    } else if document.trim_ascii_start().starts_with(b"{") {
         Format::Gltf
+    } else {
+        return Vec::new();
     };
     // Whether the document is fit to be read at all is for the reader to say.
     let Ok(container) = Container::open(bytes, format, |_| Ok(())) else {
         return Vec::new();
     };
-    if !container.json.trim_start().starts_with('{') {
+    if container.check_counts().is_err() {
         return Vec::new();
     }
     let top: Top<'_> = serde_json::from_str(&container.json).unwrap_or_default();
