@@ -122,8 +122,9 @@ async fn instances_are_warned_of() {
     document["nodes"][0]["extensions"] =
         json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 0}}});
     document["buffers"][0]["uri"] = "x.bin".into();
+    let text = document.to_string();
     let files: [(&str, &[u8]); 2] = [
-        ("a.gltf", document.to_string().as_bytes()),
+        ("a.gltf", text.as_bytes()),
         ("x.bin", &glb[json + 8..]),
     ];
     let (media_type, body) = multipart(&files);
