@@ -182,6 +182,10 @@ def meshes(zoo):
         strip.json["meshes"][0]["primitives"][0]["mode"] = 5
         strip.json["nodes"][0]["matrix"] = [2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 1, 1, 1, 1]
         put(target, "strip", write(strip))
+    # Streams of Draco and meshoptimizer; how they were made is beside the cases.
+    for path in sorted((CORPUS.parents[1] / "tests/data/mesh/cases/gltf").glob("*.glb")):
+        if path.name.startswith(("draco_", "meshopt_")):
+            put("mesh_glb", path.stem.replace("_", "-"), path.read_bytes())
     for target in ("obj", "gltf", "glb", "ply", "stl", "off"):
         for seed in sorted((CORPUS / f"mesh_{target}").glob("seed-*")):
             put("mesh_detect", f"{target}-{seed.name[5:]}", seed.read_bytes())

@@ -93,8 +93,8 @@ fn mesh_payload(file: MeshFile) -> Payload {
     // A boundary the contents would have to hash themselves to contain.
     let boundary = format!("shapelex-{}", &hash.finalize().to_hex()[..40]);
     let mut body = Vec::new();
-    let parts =
-        std::iter::once((&file.name, &file.bytes)).chain(file.companions.iter().map(|c| (&c.name, &c.bytes)));
+    let parts = std::iter::once((&file.name, file.bytes.as_slice()))
+        .chain(file.companions.iter().map(|c| (&c.name, c.bytes())));
     for (name, bytes) in parts {
         let name = name.replace(['"', '\r', '\n'], "_");
         body.extend_from_slice(
@@ -121,10 +121,7 @@ mod tests {
         let file = MeshFile {
             name: "fox.gltf".to_owned(),
             bytes: b"{}".to_vec(),
-            companions: vec![Companion {
-                name: "fox.bin".to_owned(),
-                bytes: vec![1, 2],
-            }],
+            companions: vec![Companion::new("fox.bin", vec![1, 2])],
         };
         let Payload::Bytes(content_type, body) = mesh_payload(file) else {
             panic!("expected bytes")

@@ -1,7 +1,9 @@
 //! Mesh files on disk, with the buffers they refer to.
 
 use super::CliError;
+use crate::mesh::gltf::external_buffers;
 use crate::mesh::{Companion, Source};
+use std::io::Read;
 use std::path::Path;
 
 /// The last part of a path, for people.
@@ -43,13 +45,27 @@ impl MeshFile {
         }
         let bytes = std::fs::read(path).map_err(|error| CliError::at(path, error))?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let companions = buffer_uris(&bytes)
-            .into_iter()
-            .filter_map(|name| {
-                let bytes = std::fs::read(folder.join(&name)).ok()?;
-                Some(Companion { name, bytes })
-            })
-            .collect();
+        let mut left = max_bytes.saturating_sub(bytes.len());
+        let mut companions = Vec::new();
+        for uri in external_buffers(&bytes) {
+            let Some(beside) = uri.candidates().map(|p| folder.join(p)).find(|p| p.is_file()) else {
+                continue;
+            };
+            let contents = std::fs::File::open(&beside)
+                .and_then(|file| {
+                    let mut contents = Vec::new();
+                    file.take(left as u64 + 1).read_to_end(&mut contents)?;
+                    Ok(contents)
+                })
+                .map_err(|error| CliError::at(&beside, error))?;
+            left = left.checked_sub(contents.len()).ok_or_else(|| {
+                CliError::at(
+                    &beside,
+                    format!("with its buffers the file has more bytes than the limit of {max_bytes}"),
+                )
+            })?;
+            companions.push(Companion::new(uri.path(), contents));
+        }
         Ok(Self {
             name: file_name(path),
             bytes,
@@ -68,45 +84,36 @@ impl MeshFile {
     }
 }
 
-/// The buffers a glTF in JSON refers to by a plain relative path. Absolute paths and those that climb out of the
-/// folder are left out: a model that came from elsewhere has no business with them.
-fn buffer_uris(bytes: &[u8]) -> Vec<String> {
-    if bytes.iter().find(|b| !b.is_ascii_whitespace()) != Some(&b'{') {
-        return Vec::new();
-    }
-    #[derive(serde::Deserialize)]
-    struct Document {
-        #[serde(default)]
-        buffers: Vec<Buffer>,
-    }
-    #[derive(serde::Deserialize)]
-    struct Buffer {
-        uri: Option<String>,
-    }
-    let Ok(document) = serde_json::from_slice::<Document>(bytes) else {
-        return Vec::new();
-    };
-    document
-        .buffers
-        .into_iter()
-        .filter_map(|b| b.uri)
-        .filter(|uri| !uri.starts_with("data:"))
-        .filter(|uri| {
-            Path::new(uri)
-                .components()
-                .all(|c| matches!(c, std::path::Component::Normal(_)))
-        })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn only_buffers_below_the_file_are_read() {
-        let gltf = br#"{"buffers":[{"uri":"a.bin"},{"uri":"data:;base64,AA=="},{"uri":"../../secret"},{"uri":"/etc/passwd"},{}]}"#;
-        assert_eq!(buffer_uris(gltf), ["a.bin"]);
-        assert!(buffer_uris(b"v 0 0 0").is_empty());
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("model");
+        std::fs::create_dir_all(folder.join("parts")).unwrap();
+        std::fs::write(dir.path().join("secret.bin"), "secret").unwrap();
+        std::fs::write(folder.join("a b.bin"), "a").unwrap();
+        std::fs::write(folder.join("parts/b.bin"), "b").unwrap();
+        let secret = dir.path().join("secret.bin");
+        let gltf = serde_json::json!({"buffers": [
+            {"uri": "a%20b.bin"}, {"uri": "./a b.bin"}, {"uri": "parts\\b.bin"}, {"uri": "data:;base64,AA=="},
+            {"uri": "../secret.bin"}, {"uri": secret}, {"uri": "..%2Fsecret.bin"}, {"uri": "missing.bin"}, {}
+        ]});
+        let path = folder.join("m.gltf");
+        std::fs::write(&path, gltf.to_string()).unwrap();
+        let file = MeshFile::load(&path, 1 << 20).unwrap();
+        let mut found: Vec<(&str, &[u8])> = file
+            .companions
+            .iter()
+            .map(|c| (c.name.as_str(), c.bytes()))
+            .collect();
+        found.sort();
+        let expected: [(&str, &[u8]); 2] = [("a b.bin", b"a"), ("parts/b.bin", b"b")];
+        assert_eq!(found, expected);
+        let size = file.bytes.len();
+        assert!(MeshFile::load(&path, size + 2).is_ok());
+        assert!(MeshFile::load(&path, size + 1).is_err());
     }
 }

@@ -7,7 +7,9 @@ use super::values::poses;
 use super::{CliError, ParameterArgs, figures, output};
 use crate::cancel::Cancel;
 use crate::figure::{GalleryRow, RowView, as_large_as, gallery};
-use crate::mesh::{Format, Limits, PrepareReport, TriangleSoup, prepare, read, read_poses};
+use crate::mesh::{
+    Format, Limits, PrepareReport, ReadContext, TriangleSoup, prepare, read_poses_within, read_within,
+};
 use crate::parameters::Parameters;
 use crate::pipeline::describe_shape;
 use crate::pipeline::prepared::refined_to;
@@ -101,14 +103,14 @@ fn inspect(
     parameters: &Parameters,
     mut drawn: Option<&mut Vec<GalleryRow>>,
 ) -> Result<Vec<Inspection>, CliError> {
-    let limits = Limits::default();
+    let context = ReadContext::new(Limits::default());
     let (format, soups): (Format, Vec<(Option<String>, TriangleSoup)>) = match poses {
         None => {
-            let (format, soup) = read(&mesh.source(), &limits)?;
+            let (format, soup) = read_within(&mesh.source(), &context)?;
             (format, vec![(None, soup)])
         }
         Some(count) => {
-            let (format, poses) = read_poses(&mesh.source(), count, &limits)?;
+            let (format, poses) = read_poses_within(&mesh.source(), count, &context)?;
             (
                 format,
                 poses.into_iter().map(|p| (Some(p.label), p.soup)).collect(),
@@ -131,7 +133,8 @@ fn inspect(
                     meshes: vec![Some(soup.clone()), Some(as_large_as(&soup, prepared))],
                 });
             }
-            let description = describe_shape(soup, parameters, &Cancel::new(), &|_| ())?;
+            let mut description = describe_shape(soup, parameters, &Cancel::new(), &|_| ())?;
+            description.report.warnings.splice(0..0, context.warnings.list());
             Ok(Inspection {
                 file: file.to_owned(),
                 pose,

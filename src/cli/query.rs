@@ -10,7 +10,7 @@ use super::values::{at_least_one, one_of};
 use super::{CliError, api, dictionaries, output, query_text};
 use crate::cancel::Cancel;
 use crate::http::dto::parameters::QueryRankByName;
-use crate::mesh::{Limits, read};
+use crate::mesh::{Limits, ReadContext, read_within};
 use crate::parameters::RankBy;
 use crate::pipeline::prepared::refined_to;
 use crate::pipeline::{describe_query, rank_top};
@@ -155,8 +155,10 @@ fn rank_against(
     limits: &Limits,
 ) -> Result<Value, CliError> {
     let cancel = Cancel::new();
-    let (format, soup) = read(&file.source(), limits)?;
-    let description = describe_query(soup, &index.parameters, &cancel, &|_| ())?;
+    let context = ReadContext::new(*limits);
+    let (format, soup) = read_within(&file.source(), &context)?;
+    let mut description = describe_query(soup, &index.parameters, &cancel, &|_| ())?;
+    description.report.warnings.splice(0..0, context.warnings.list());
     let ranking = rank_top(&description.views, index, rank_by, top, &cancel)
         .map_err(crate::pipeline::PipelineError::from)?;
     let classes: Vec<Value> = ranking

@@ -11,7 +11,7 @@ use super::state::Parts;
 use super::time_limit::{TimeView, rank_until};
 use super::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
-use crate::mesh::TriangleSoup;
+use crate::mesh::{ReadContext, TriangleSoup};
 use crate::model::ClassId;
 use crate::parameters::Parameters;
 use crate::pipeline::prepared::OPEN_ABOVE;
@@ -50,7 +50,11 @@ pub fn answer(
     observer(Stage::Read);
     let reserved = state.memory.reservation();
     reserved.grow(mesh.reading_bytes())?;
-    let (format, soup) = mesh.read(&state.config.limits)?;
+    let context = ReadContext {
+        cancel: work.cancel.clone(),
+        ..ReadContext::new(state.config.limits)
+    };
+    let (format, soup) = mesh.read(&context)?;
     // Held beside each other, since preparing, which the reading is reserved for, is a part of describing.
     reserved.grow(spectrum_bytes(&soup, parameters))?;
     let stop = limit.map_or(&work.cancel, |limit| &limit.over);
@@ -150,7 +154,7 @@ pub fn answer(
         not_compared: left.iter().map(|label| class_of(label)).collect(),
         signatures: ranking.signatures,
         format: format.extension().to_owned(),
-        warnings: description.report.warnings.clone(),
+        warnings: [context.warnings.list(), description.report.warnings.clone()].concat(),
         mesh: description.report.into(),
         eigenvalues: description.eigenvalues,
         generation: generation.number,

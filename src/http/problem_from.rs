@@ -35,6 +35,7 @@ impl From<MeshError> for Problem {
                 .with("vertices", vertices),
             MeshError::NotFinite { vertex } => of(Code::NotFinite).with("vertex", vertex),
             MeshError::NoFaces { vertices } => of(Code::NoFaces).with("vertices", vertices),
+            MeshError::EmptyScene { meshes } => of(Code::NoFaces).with("meshes", meshes),
             MeshError::TooSmall { vertices, faces } => of(Code::MeshTooSmall)
                 .with("vertices", vertices)
                 .with("faces", faces),

@@ -1,8 +1,8 @@
 //! A mesh as it was sent, and the buffers a glTF finds beside it.
 
-use crate::mesh::{Companion, Format, Limits, MeshError, Pose, Source, TriangleSoup};
+use crate::mesh::gltf::external_buffers;
+use crate::mesh::{Companion, Format, MeshError, Pose, ReadContext, Source, TriangleSoup};
 use bytes::Bytes;
-use serde::Deserialize;
 use std::sync::Arc;
 
 /// A file of a request's body.
@@ -42,15 +42,15 @@ impl UploadedMesh {
     }
 
     /// Reads it as one mesh.
-    pub fn read(&self, limits: &Limits) -> Result<(Format, TriangleSoup), MeshError> {
+    pub fn read(&self, context: &ReadContext) -> Result<(Format, TriangleSoup), MeshError> {
         let companions = self.companions();
-        crate::mesh::read(&self.source(&companions), limits)
+        crate::mesh::read_within(&self.source(&companions), context)
     }
 
     /// Samples poses of an animated glTF.
-    pub fn read_poses(&self, poses: usize, limits: &Limits) -> Result<(Format, Vec<Pose>), MeshError> {
+    pub fn read_poses(&self, poses: usize, context: &ReadContext) -> Result<(Format, Vec<Pose>), MeshError> {
         let companions = self.companions();
-        crate::mesh::read_poses(&self.source(&companions), poses, limits)
+        crate::mesh::read_poses_within(&self.source(&companions), poses, context)
     }
 
     /// The file as the readers want it.
@@ -63,74 +63,21 @@ impl UploadedMesh {
         }
     }
 
-    /// The buffers a glTF refers to, under the names it calls them by. Copied on demand, so that a thousand meshes
-    /// beside one large buffer do not hold a thousand copies.
+    /// The buffers a glTF refers to, as far as they came along, each once. They share the request's bytes.
+    ///
+    /// A buffer is looked for from the mesh's own folder or, since browsers send names without folders, by its last
+    /// part alone.
     pub fn companions(&self) -> Vec<Companion> {
-        let is_json = self.bytes.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{');
-        if !is_json || self.buffers.is_empty() {
+        if self.buffers.is_empty() {
             return Vec::new();
         }
-        // A document that does not parse gets no buffers here and its own error from the reader.
-        let document: GltfBuffers = serde_json::from_slice(&self.bytes).unwrap_or_default();
         let folder = self.name.rsplit_once('/').map_or("", |(folder, _)| folder);
-        let mut companions: Vec<Companion> = Vec::new();
-        for uri in document.buffers.into_iter().filter_map(|buffer| buffer.uri) {
-            if uri.starts_with("data:") || companions.iter().any(|c| c.name == uri) {
-                continue;
-            }
-            if let Some(part) = self.buffer(folder, &uri) {
-                companions.push(Companion {
-                    name: uri,
-                    bytes: part.bytes.to_vec(),
-                });
-            }
-        }
-        companions
+        external_buffers(&self.bytes)
+            .into_iter()
+            .filter_map(|uri| {
+                let part = uri.find(folder, &self.buffers, |part| &part.name, |part| !part.packed)?;
+                Some(Companion::new(uri.path(), part.bytes.clone()))
+            })
+            .collect()
     }
-
-    /// The buffer a URI means: relative to the mesh's own folder or, since browsers send names without folders, by
-    /// its last part alone.
-    fn buffer(&self, folder: &str, uri: &str) -> Option<&Part> {
-        let uri = percent_decoded(uri);
-        let uri = uri.trim_start_matches("./");
-        let path = match folder {
-            "" => uri.to_owned(),
-            _ => format!("{folder}/{uri}"),
-        };
-        let last = uri.rsplit('/').next().unwrap_or(uri);
-        let exact = self.buffers.iter().find(|part| part.name == path);
-        exact.or_else(|| self.buffers.iter().find(|part| !part.packed && part.name == last))
-    }
-}
-
-/// The part of a glTF document that names other files.
-#[derive(Default, Deserialize)]
-struct GltfBuffers {
-    #[serde(default)]
-    buffers: Vec<GltfBuffer>,
-}
-
-#[derive(Deserialize)]
-struct GltfBuffer {
-    uri: Option<String>,
-}
-
-fn percent_decoded(text: &str) -> String {
-    let digit = |byte: Option<&u8>| byte.and_then(|b| char::from(*b).to_digit(16));
-    let bytes = text.as_bytes();
-    let mut decoded = Vec::with_capacity(bytes.len());
-    let mut i = 0;
-    while i < bytes.len() {
-        match (bytes[i], digit(bytes.get(i + 1)), digit(bytes.get(i + 2))) {
-            (b'%', Some(high), Some(low)) => {
-                decoded.push((high * 16 + low) as u8);
-                i += 3;
-            }
-            (byte, ..) => {
-                decoded.push(byte);
-                i += 1;
-            }
-        }
-    }
-    String::from_utf8_lossy(&decoded).into_owned()
 }

@@ -8,8 +8,10 @@ use crate::model::{ContentHash, FailedShape, Shape};
 use crate::parameters::Parameters;
 use crate::pipeline::{Description, PipelineError, StageSpan, describe_shape};
 use crate::store::{OriginalDamage, Store, StoreError};
+use bytes::Bytes;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -170,16 +172,16 @@ impl Describer<'_> {
                 .map_err(|e| Failure::new(original_failure(&e), e.to_string()))
         };
         let bytes = load(shape.content)?;
-        let companions = shape
-            .companions
-            .iter()
-            .map(|file| {
-                Ok(Companion {
-                    name: file.name.clone(),
-                    bytes: load(file.content)?,
-                })
-            })
-            .collect::<Result<Vec<_>, Failure>>()?;
+        // A file under several names is loaded once.
+        let mut loaded: BTreeMap<ContentHash, Bytes> = BTreeMap::new();
+        let mut companions = Vec::with_capacity(shape.companions.len());
+        for file in &shape.companions {
+            let bytes = match loaded.entry(file.content) {
+                Entry::Occupied(known) => known.get().clone(),
+                Entry::Vacant(slot) => slot.insert(Bytes::from(load(file.content)?)).clone(),
+            };
+            companions.push(Companion::new(file.name.clone(), bytes));
+        }
         let source = Source {
             bytes: &bytes,
             name: Some(name_of(shape.format)),

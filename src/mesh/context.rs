@@ -3,7 +3,7 @@
 use super::Limits;
 use crate::cancel::Cancel;
 use crate::memory::{MemoryBudget, Reservation};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Passed to every reader. A reader checks [`limits`](Self::limits) against what the file declares, reserves
 /// [`memory`](Self::memory) before each large allocation, and looks at [`cancel`](Self::cancel) at least every 20 ms.
@@ -15,6 +15,28 @@ pub struct ReadContext {
     pub cancel: Cancel,
     /// The memory of the request the file belongs to.
     pub memory: Arc<Reservation>,
+    /// What was left out of the mesh.
+    pub warnings: Warnings,
+}
+
+/// Sentences about files that were read, though not all of what they hold. Clones collect into the same list.
+#[derive(Clone, Debug, Default)]
+pub struct Warnings(Arc<Mutex<Vec<String>>>);
+
+impl Warnings {
+    /// Adds a sentence, unless it is there already.
+    pub fn add(&self, sentence: impl Into<String>) {
+        let mut list = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let sentence = sentence.into();
+        if !list.contains(&sentence) {
+            list.push(sentence);
+        }
+    }
+
+    /// The sentences so far.
+    pub fn list(&self) -> Vec<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
 }
 
 impl ReadContext {
@@ -24,6 +46,7 @@ impl ReadContext {
             limits,
             cancel: Cancel::new(),
             memory: Arc::new(MemoryBudget::unlimited().reservation()),
+            warnings: Warnings::default(),
         }
     }
 }

@@ -20,11 +20,14 @@ pub enum MeshError {
     #[error("the {format} file is cut short: {detail}")]
     Truncated { format: Format, detail: String },
     /// The file needs something we do not do, named as its format names it.
-    #[error("the {format} file needs {feature}, which shapelex does not support; re-export it without")]
-    Unsupported { format: Format, feature: String },
-    /// A glTF points to a file that was not sent with it.
     #[error(
-        "the glTF file refers to '{uri}', which was not part of the upload; send it in the same multipart request or export a GLB"
+        "the {format} file needs {feature}, which shapelex does not support; {}",
+        instead_of(feature)
+    )]
+    Unsupported { format: Format, feature: String },
+    /// A glTF points to a file that did not come with it.
+    #[error(
+        "the glTF file refers to '{uri}', which is missing; put it beside the file (over HTTP, send it in the same multipart request or archive), or export a GLB"
     )]
     MissingBuffer { uri: String },
     /// A face points outside the vertex list.
@@ -40,6 +43,11 @@ pub enum MeshError {
     /// There are points but no faces.
     #[error("the file has {vertices} vertices and no faces; shapelex needs a surface, not a point cloud")]
     NoFaces { vertices: usize },
+    /// The default scene of a glTF has no node that shows a mesh.
+    #[error(
+        "the file's scene shows none of its {meshes} meshes; add them to the scene that is shown first, and export it again"
+    )]
+    EmptyScene { meshes: usize },
     /// Fewer vertices or faces than a spectrum needs, after cleaning.
     #[error(
         "only {vertices} vertices and {faces} faces are left after cleaning; a shape needs at least 4 vertices and 2 faces"
@@ -72,6 +80,14 @@ pub enum MeshError {
     /// A [`TriMesh`](super::TriMesh) was built from arrays that break its invariants.
     #[error("invalid mesh: {detail}")]
     Invalid { detail: String },
+}
+
+/// What to do about a feature that is not supported.
+fn instead_of(feature: &str) -> &'static str {
+    match feature {
+        "glTF 1.0" => "export it as glTF 2.0",
+        _ => "re-export it without",
+    }
 }
 
 impl MeshError {

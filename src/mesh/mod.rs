@@ -34,7 +34,7 @@ pub mod trimesh;
 pub mod weld;
 pub mod whiten;
 
-pub use context::ReadContext;
+pub use context::{ReadContext, Warnings};
 pub use error::MeshError;
 pub use format::Format;
 pub use limits::Limits;

@@ -1,14 +1,39 @@
 //! One entrance for every format.
 
 use super::{Format, Limits, MeshError, ReadContext, TriangleSoup, detect, gltf, obj, off, ply, stl};
+use std::fmt;
+use std::sync::Arc;
 
-/// A file that came with another one in the same upload, such as a glTF's `.bin`.
-#[derive(Clone, Debug)]
+/// A file that came with another one, such as a glTF's `.bin`. Clones share its contents.
+#[derive(Clone)]
 pub struct Companion {
-    /// The name it was sent under, matched against the URI that refers to it.
+    /// Its path relative to the file that refers to it.
     pub name: String,
+    bytes: Arc<dyn AsRef<[u8]> + Send + Sync>,
+}
+
+impl Companion {
+    /// A file of this name. `bytes` is kept as it is, so that a reference-counted buffer is not copied.
+    pub fn new(name: impl Into<String>, bytes: impl AsRef<[u8]> + Send + Sync + 'static) -> Self {
+        Self {
+            name: name.into(),
+            bytes: Arc::new(bytes),
+        }
+    }
+
     /// Its contents.
-    pub bytes: Vec<u8>,
+    pub fn bytes(&self) -> &[u8] {
+        (*self.bytes).as_ref()
+    }
+}
+
+impl fmt::Debug for Companion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Companion")
+            .field("name", &self.name)
+            .field("bytes", &self.bytes().len())
+            .finish()
+    }
 }
 
 /// A mesh file as it arrived.

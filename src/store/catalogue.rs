@@ -266,11 +266,11 @@ impl Store {
                     .map(|companion| {
                         Ok(CompanionFile {
                             name: companion.name.clone(),
-                            content: keep(&companion.bytes)?,
+                            content: keep(companion.bytes())?,
                         })
                     })
                     .collect::<Result<_, StoreError>>()?;
-                let length = new.bytes.len() + new.companions.iter().map(|c| c.bytes.len()).sum::<usize>();
+                let length = new.bytes.len() + new.companions.iter().map(|c| c.bytes().len()).sum::<usize>();
                 Ok(Shape {
                     id: ShapeId::new(),
                     class,

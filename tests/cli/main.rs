@@ -5,6 +5,7 @@ mod catalogue;
 mod commands;
 mod configuration;
 mod figures;
+mod gltf;
 mod https;
 mod keys;
 mod readme;

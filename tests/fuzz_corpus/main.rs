@@ -4,6 +4,7 @@
 mod archive;
 #[path = "../../fuzz/src/mesh.rs"]
 mod mesh;
+mod mutations;
 #[path = "../../fuzz/src/polygon.rs"]
 mod polygon;
 #[path = "../../fuzz/src/request.rs"]

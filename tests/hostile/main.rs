@@ -9,6 +9,7 @@ mod harness;
 mod meshes;
 
 mod archives;
+mod gltf;
 mod surfaces;
 
 use harness::{App, small};
@@ -66,7 +67,17 @@ async fn each_is_answered_with_its_problem() {
     for make in makers {
         wrong.extend(attempt(&app, make()).await);
     }
+    wrong.extend(gltf::read_all());
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+    let answer = app.post("/v1/query", "application/zip", gltf::spellings()).await;
+    assert_eq!(answer.status, 200, "{}", answer.text());
+    assert!(
+        peak().unwrap_or(0) < MEMORY,
+        "one file under many names: {} MB",
+        peak().unwrap_or(0) >> 20
+    );
 
     for (name, body) in surfaces::answerable() {
         let began = Instant::now();

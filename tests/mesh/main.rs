@@ -3,8 +3,11 @@
 mod bad_input;
 mod budget;
 mod cases;
+mod cases_gltf;
 mod differential;
 mod encode;
 mod gltf;
+mod gltf_oracle;
+mod gltf_work;
 mod readers;
 mod real_data;

@@ -132,10 +132,10 @@ fn cases() -> Vec<(&'static str, &'static str, Vec<u8>, u16, &'static str)> {
             "invalid_archive",
         ),
         (
-            "needs Draco",
+            "needs an extension that we do not read",
             "model/gltf+json",
             text(
-                r#"{"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"],"extensionsUsed":["KHR_draco_mesh_compression"],"scenes":[{"nodes":[]}],"scene":0}"#,
+                r#"{"asset":{"version":"2.0"},"extensionsRequired":["EXT_mesh_primitive_restart"],"extensionsUsed":["EXT_mesh_primitive_restart"],"scenes":[{"nodes":[]}],"scene":0}"#,
             ),
             422,
             "unsupported_feature",

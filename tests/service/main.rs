@@ -9,6 +9,7 @@ mod connections;
 mod contract;
 mod dashboards;
 mod flow;
+mod gltf_buffers;
 mod harness;
 mod limits;
 mod meshes;

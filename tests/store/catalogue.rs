@@ -73,10 +73,7 @@ fn the_same_file_and_pose_is_the_same_shape() {
     assert!(store.add_shapes(dog, vec![shape("a", None)]).unwrap()[0].created);
     // Another companion makes another shape of the same file.
     let mut with_buffer = shape("a", None);
-    with_buffer.companions = vec![Companion {
-        name: "a.bin".into(),
-        bytes: b"buffer".to_vec(),
-    }];
+    with_buffer.companions = vec![Companion::new("a.bin", b"buffer".to_vec())];
     let added = store.add_shapes(dog, vec![with_buffer]).unwrap();
     assert!(added[0].created);
     assert_eq!(added[0].shape.bytes, 7);

@@ -12,7 +12,7 @@ use crate::http::problem::{Code, Problem};
 use crate::http::state::Parts;
 use crate::http::upload;
 use crate::http::uploaded::UploadedMesh;
-use crate::mesh::{Limits, PrepareOptions, prepare};
+use crate::mesh::{Limits, PrepareOptions, ReadContext, prepare};
 use crate::model::{Class, ClassName, NewShape, Shape, ShapeId, ShapePose};
 use crate::store::{AddedShape, StoreError};
 use axum::Json;
@@ -181,24 +181,31 @@ fn check_one(
     options: &PrepareOptions,
     cancel: &crate::cancel::Cancel,
 ) -> Result<Vec<NewShape>, Problem> {
+    let context = ReadContext {
+        cancel: cancel.clone(),
+        ..ReadContext::new(*limits)
+    };
+    // Shared by all poses.
+    let companions = mesh.companions();
     let shape = |format, pose, soup| -> Result<NewShape, Problem> {
         let stopped = |c: crate::cancel::Cancelled| Problem::new(Code::Cancelled, c.to_string());
         cancel.check().map_err(stopped)?;
-        let (_, report) = prepare(soup, options)?;
+        let (_, mut report) = prepare(soup, options)?;
+        report.warnings.splice(0..0, context.warnings.list());
         Ok(NewShape {
             name: Some(mesh.name.clone()),
             bytes: mesh.bytes.clone(),
-            companions: mesh.companions(),
+            companions: companions.clone(),
             format,
             pose,
             report,
         })
     };
     let Some(wanted) = poses else {
-        let (format, soup) = mesh.read(limits)?;
+        let (format, soup) = mesh.read(&context)?;
         return Ok(vec![shape(format, None, soup)?]);
     };
-    let (format, found) = mesh.read_poses(wanted, limits)?;
+    let (format, found) = mesh.read_poses(wanted, &context)?;
     let of = found.len();
     found
         .into_iter()

@@ -1,92 +1,146 @@
-//! The JSON document and its buffers.
+//! The JSON document: its lists, and the elements that are asked for.
 
-use crate::mesh::{Format, Limits, MeshError, Source};
-use base64::Engine;
-use base64::alphabet::{STANDARD, URL_SAFE};
-use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
-use gltf::json::Root;
-use gltf::{Error as GltfError, Glb, binary};
-use std::borrow::Cow;
-use std::cell::{Cell, OnceCell};
+use super::buffers::Buffers;
+use super::container::Container;
+use super::list::{List, reason};
+use super::schema::{Asset, Index, Top, text};
+use super::work::Work;
+use crate::memory::Held;
+use crate::mesh::{Format, Limits, MeshError, ReadContext, Source};
+use serde::Deserialize;
+use serde_json::value::RawValue;
+use std::cell::Cell;
 
-/// Most JSON objects in one document. Each becomes a few hundred bytes of structures, whatever its length in text.
-const MAX_OBJECTS: usize = 400_000;
-/// Most JSON values in one document, by its commas. A number of two bytes in a list becomes over thirty.
-const MAX_VALUES: usize = 4_000_000;
-
-/// Required extensions that change nothing about the surface, by prefix, and the one that we read.
-const HARMLESS: [&str; 9] = [
+/// Extensions that are read where they are required.
+const READ: [&str; 6] = [
     "KHR_mesh_quantization",
-    "KHR_materials_",
-    "KHR_texture_",
-    "EXT_texture_",
-    "MSFT_texture_",
-    "KHR_lights_",
-    "EXT_lights_",
-    "KHR_xmp",
-    "KHR_audio",
+    "KHR_draco_mesh_compression",
+    "EXT_meshopt_compression",
+    "KHR_meshopt_compression",
+    "EXT_mesh_gpu_instancing",
+    "KHR_node_visibility",
 ];
 
-/// A parsed document with access to its buffers.
-pub(super) struct Document<'a> {
-    pub root: Root,
-    pub format: Format,
-    pub limits: Limits,
-    blob: Option<&'a [u8]>,
-    source: Source<'a>,
-    buffers: Vec<OnceCell<Cow<'a, [u8]>>>,
-    /// Bytes of buffers taken in so far.
-    taken: Cell<usize>,
-    /// Numbers that may still be read from accessors; see [`Document::spend`].
-    budget: Cell<usize>,
+/// What required extensions are about that leave the surface as it is, whatever vendor they are from: how it looks,
+/// sounds and behaves, what it is called and what it collides with. An extension that is about none of these may say
+/// where the surface is (as `EXT_mesh_primitive_restart` and `KHR_accessor_float64` do), so it is refused by name.
+const HARMLESS_SUBJECTS: [&str; 22] = [
+    "materials_",
+    "texture_",
+    "image_",
+    "lights_",
+    "xmp",
+    "audio",
+    "techniques_webgl",
+    "animation_pointer",
+    "blend",
+    "environment_map",
+    "mesh_features",
+    "instance_features",
+    "structural_metadata",
+    "feature_metadata",
+    "mesh_manifold",
+    "primitive_outline",
+    "mesh_primitive_edge_visibility",
+    "physics_",
+    "implicit_shapes",
+    "collision",
+    "interactivity",
+    "node_",
+];
+
+/// Whole extensions that leave the surface as it is: a shift of the whole scene, encodings that degrade to plain
+/// triangles, alternatives beside the scene, descriptions of what may move.
+const HARMLESS: [&str; 9] = [
+    "CESIUM_RTC",
+    "FB_ngon_encoding",
+    "MSFT_lod",
+    "AGI_articulations",
+    "AGI_stk_metadata",
+    "GODOT_single_root",
+    "KHR_binary_glTF",
+    "VRM",
+    "KHR_xmp_json_ld",
+];
+
+/// Whether a required extension can be read, or passed over.
+fn accepted(extension: &str) -> bool {
+    let subject = extension.split_once('_').map_or("", |(_, subject)| subject);
+    READ.contains(&extension)
+        || HARMLESS.contains(&extension)
+        || extension.starts_with("VRMC_")
+        || HARMLESS_SUBJECTS.iter().any(|s| subject.starts_with(s))
 }
 
-impl<'a> Document<'a> {
-    /// Parses the container and the JSON and refuses required extensions that are not read.
-    pub fn open(source: &Source<'a>, format: Format, limits: &Limits) -> Result<Self, MeshError> {
-        let (json, blob): (&'a [u8], Option<&'a [u8]>) = match format {
-            Format::Glb => split_glb(source.bytes)?,
-            _ => (source.bytes, None),
-        };
-        let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
-        for (what, byte, limit) in [
-            ("JSON objects", b'{', MAX_OBJECTS),
-            ("JSON values", b',', MAX_VALUES),
-        ] {
-            let found = json.iter().filter(|&&b| b == byte).count();
-            if found > limit {
-                return Err(MeshError::TooLarge { what, found, limit });
-            }
-        }
-        let root: Root = gltf::json::deserialize::from_slice(json).map_err(|error| {
-            if error.is_eof() {
-                MeshError::truncated(format, format!("its JSON ends too early: {error}"))
-            } else {
-                MeshError::malformed(format, format!("its JSON: {error}"))
-            }
-        })?;
-        if let Some(extension) = root
-            .extensions_required
-            .iter()
-            .find(|e| !HARMLESS.iter().any(|h| e.starts_with(h)))
-        {
+/// A document, with access to its buffers.
+pub(super) struct Document<'d> {
+    pub format: Format,
+    pub limits: &'d Limits,
+    pub context: &'d ReadContext,
+    pub work: Work<'d>,
+    pub scene: Option<usize>,
+    pub scenes: List<'d>,
+    pub nodes: List<'d>,
+    pub meshes: List<'d>,
+    pub accessors: List<'d>,
+    pub views: List<'d>,
+    pub skins: List<'d>,
+    animations: Option<&'d RawValue>,
+    pub buffers: Buffers<'d>,
+    /// Joints with a weight that were read so far, of all vertices.
+    pub influences: Cell<usize>,
+    /// Bytes of accessors that are unpacked at the moment.
+    pub unpacked: Cell<usize>,
+    _memory: Held<'d>,
+}
+
+impl<'d> Document<'d> {
+    /// Reads the document's lists and refuses required extensions that are not read.
+    pub fn open(
+        container: &'d Container<'d>,
+        source: &Source<'d>,
+        context: &'d ReadContext,
+    ) -> Result<Self, MeshError> {
+        let format = container.format;
+        let bytes = container.check_counts()?;
+        let memory = context.memory.hold(bytes)?;
+        let top = top(format, &container.json)?;
+        let malformed = |detail: String| MeshError::malformed(format, detail);
+        let list = |name, raw: Option<&'d RawValue>| List::parse(name, raw).map_err(malformed);
+        let required: Vec<&RawValue> = list("required extension", top.extensions_required)?.into_elements();
+        if let Some(extension) = required.into_iter().filter_map(text).find(|e| !accepted(e)) {
             return Err(MeshError::Unsupported {
                 format,
-                feature: extension.clone(),
+                feature: extension.into_owned(),
             });
         }
-        let document = Self {
-            buffers: root.buffers.iter().map(|_| OnceCell::new()).collect(),
-            root,
+        let scene = top.scene.map(|raw| serde_json::from_str::<Index>(raw.get()));
+        let scene = scene.transpose().map_err(|e| malformed(format!("scene: {e}")))?;
+        let buffers = list("buffer", top.buffers)?;
+        let views = list("buffer view", top.buffer_views)?;
+        Ok(Self {
             format,
-            limits: *limits,
-            blob,
-            source: *source,
-            taken: Cell::new(source.bytes.len()),
-            budget: Cell::new(0),
-        };
-        document.refill();
-        Ok(document)
+            limits: &context.limits,
+            context,
+            work: Work::new(&context.cancel),
+            scene: scene.map(Index::value),
+            scenes: list("scene", top.scenes)?,
+            nodes: list("node", top.nodes)?,
+            meshes: list("mesh", top.meshes)?,
+            accessors: list("accessor", top.accessors)?,
+            skins: list("skin", top.skins)?,
+            animations: top.animations,
+            buffers: Buffers::new(views.len(), buffers, container.binary, source, context),
+            views,
+            influences: Cell::new(0),
+            unpacked: Cell::new(0),
+            _memory: memory,
+        })
+    }
+
+    /// The animations; only poses need them.
+    pub fn animations(&self) -> Result<List<'d>, MeshError> {
+        List::parse("animation", self.animations).map_err(|detail| self.malformed(detail))
     }
 
     /// A [`MeshError::Malformed`] of this document.
@@ -99,172 +153,81 @@ impl<'a> Document<'a> {
         MeshError::truncated(self.format, detail)
     }
 
-    /// What `index` points to, or the error that there is no such `what`.
-    pub fn get<'s, T>(&self, list: &'s [T], index: usize, what: &str) -> Result<&'s T, MeshError> {
-        list.get(index).ok_or_else(|| {
+    /// Parses element `index` of a list.
+    pub fn get<T: Deserialize<'d>>(&self, list: &List<'d>, index: usize) -> Result<T, MeshError> {
+        let raw = self.element(list, index)?;
+        // An element that is referred to very often is parsed as often.
+        self.work.spend(raw.get().len(), 2, "steps of reading its JSON")?;
+        serde_json::from_str(raw.get())
+            .map_err(|error| self.malformed(format!("{} {index}: {}", list.name(), reason(&error))))
+    }
+
+    /// The text of element `index` of a list.
+    pub fn element(&self, list: &List<'d>, index: usize) -> Result<&'d RawValue, MeshError> {
+        list.elements().get(index).copied().ok_or_else(|| {
             self.malformed(format!(
-                "it refers to {what} {index}, but has {} of them",
+                "it refers to {} {index}, but has {} of them",
+                list.name(),
                 list.len()
             ))
         })
     }
-
-    /// Allows the reading of another pose.
-    pub fn refill(&self) {
-        self.budget.set(self.limits.max_bytes);
-    }
-
-    /// Counts numbers read from accessors. An honest file stores each number it needs, in a byte at least; a small file
-    /// that reads the same bytes through a million accessors is stopped here.
-    pub fn spend(&self, numbers: usize) -> Result<(), MeshError> {
-        match self.budget.get().checked_sub(numbers) {
-            Some(left) => {
-                self.budget.set(left);
-                Ok(())
-            }
-            None => Err(MeshError::TooLarge {
-                what: "numbers in its accessors",
-                found: self.limits.max_bytes.saturating_add(1),
-                limit: self.limits.max_bytes,
-            }),
-        }
-    }
-
-    /// The contents of a buffer, at least as long as it declares.
-    pub fn buffer(&self, index: usize) -> Result<&[u8], MeshError> {
-        let slot = self.get(&self.buffers, index, "buffer")?;
-        if let Some(bytes) = slot.get() {
-            return Ok(bytes);
-        }
-        let bytes = self.load(index)?;
-        let declared = self.root.buffers[index].byte_length.0;
-        if (bytes.len() as u64) < declared {
-            return Err(self.truncated(format!(
-                "buffer {index} declares {declared} bytes and has {}",
-                bytes.len()
-            )));
-        }
-        Ok(slot.get_or_init(|| bytes))
-    }
-
-    fn load(&self, index: usize) -> Result<Cow<'a, [u8]>, MeshError> {
-        let Some(uri) = &self.root.buffers[index].uri else {
-            return match self.blob {
-                Some(blob) if index == 0 => Ok(Cow::Borrowed(blob)),
-                _ => Err(self.malformed(format!("buffer {index} has neither a `uri` nor a binary chunk"))),
-            };
-        };
-        if uri.len() >= 5 && uri.as_bytes()[..5].eq_ignore_ascii_case(b"data:") {
-            return self.decode_data_uri(index, &uri[5..]).map(Cow::Owned);
-        }
-        let bytes = self.companion(uri).ok_or_else(|| MeshError::MissingBuffer {
-            uri: uri.chars().take(200).collect(),
-        })?;
-        self.taken.set(self.taken.get().saturating_add(bytes.len()));
-        self.limits.check_bytes(self.taken.get())?;
-        Ok(Cow::Borrowed(bytes))
-    }
-
-    /// The file sent along under the name the URI gives: the same path, else the same last part of it.
-    fn companion(&self, uri: &str) -> Option<&'a [u8]> {
-        let path = String::from_utf8_lossy(&percent_decode(uri)).into_owned();
-        let path = path.trim_start_matches("./").replace('\\', "/");
-        let base = |name: &str| name.rsplit(['/', '\\']).next().map(str::to_owned);
-        let companions = self.source.companions;
-        companions
-            .iter()
-            .find(|c| c.name.trim_start_matches("./") == path || c.name == uri)
-            .or_else(|| companions.iter().find(|c| base(&c.name) == base(&path)))
-            .map(|c| c.bytes.as_slice())
-    }
-
-    fn decode_data_uri(&self, index: usize, uri: &str) -> Result<Vec<u8>, MeshError> {
-        let Some((head, data)) = uri.split_once(',') else {
-            return Err(self.malformed(format!("buffer {index}: its data URI has no comma")));
-        };
-        if !head.trim_end().ends_with(";base64") {
-            return Ok(percent_decode(data));
-        }
-        let text: Cow<'_, [u8]> = if data.bytes().any(|b| b == b'%') {
-            percent_decode(data).into()
-        } else {
-            data.as_bytes().into()
-        };
-        let text: Cow<'_, [u8]> = if text.iter().any(u8::is_ascii_whitespace) {
-            text.iter()
-                .copied()
-                .filter(|b| !b.is_ascii_whitespace())
-                .collect()
-        } else {
-            text
-        };
-        let lenient = GeneralPurposeConfig::new()
-            .with_decode_padding_mode(DecodePaddingMode::Indifferent)
-            .with_decode_allow_trailing_bits(true);
-        let alphabet = if text.iter().any(|&b| b == b'-' || b == b'_') {
-            &URL_SAFE
-        } else {
-            &STANDARD
-        };
-        GeneralPurpose::new(alphabet, lenient)
-            .decode(&text)
-            .map_err(|error| self.malformed(format!("buffer {index}: its data URI: {error}")))
-    }
 }
 
-/// `%20` → a blank, and so on; a `%` without two hexadecimal digits stays as it is.
-fn percent_decode(text: &str) -> Vec<u8> {
-    let bytes = text.as_bytes();
-    let mut decoded = Vec::with_capacity(bytes.len());
-    let mut k = 0;
-    while k < bytes.len() {
-        let hex = |at: usize| bytes.get(at).and_then(|&b| (b as char).to_digit(16));
-        match (bytes[k], hex(k + 1), hex(k + 2)) {
-            (b'%', Some(high), Some(low)) => {
-                decoded.push((high * 16 + low) as u8);
-                k += 3;
-            }
-            (byte, ..) => {
-                decoded.push(byte);
-                k += 1;
-            }
+/// The top level of a document of glTF 2.
+fn top(format: Format, json: &str) -> Result<Top<'_>, MeshError> {
+    let top: Top<'_> = serde_json::from_str(json).map_err(|error| {
+        if error.is_eof() {
+            MeshError::truncated(format, format!("its JSON ends too early: {error}"))
+        } else {
+            MeshError::malformed(format, format!("its JSON: {error}"))
         }
-    }
-    decoded
-}
-
-/// The JSON and binary chunks of a GLB.
-fn split_glb(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), MeshError> {
-    if !bytes.starts_with(b"glTF") {
-        return Err(MeshError::malformed(
-            Format::Glb,
-            "a GLB begins with the four bytes `glTF`, this file does not; send JSON as model/gltf+json",
-        ));
-    }
-    let glb = Glb::from_slice(bytes).map_err(|error| match error {
-        GltfError::Binary(binary::Error::Io(_)) => {
-            MeshError::truncated(Format::Glb, "it ends within a header")
-        }
-        GltfError::Binary(binary::Error::Length { length, length_read }) => MeshError::truncated(
-            Format::Glb,
-            format!("its header promises {length} bytes, but {length_read} follow"),
-        ),
-        GltfError::Binary(binary::Error::ChunkLength {
-            length, length_read, ..
-        }) => MeshError::truncated(
-            Format::Glb,
-            format!("a chunk promises {length} bytes, but {length_read} follow"),
-        ),
-        GltfError::Binary(binary::Error::Version(version)) => MeshError::Unsupported {
-            format: Format::Glb,
-            feature: format!("version {version} of the container"),
-        },
-        error => MeshError::malformed(Format::Glb, error.to_string()),
     })?;
-    // Both were split off the slice; a copy would be the crate's own doing.
-    match (glb.json, glb.bin) {
-        (Cow::Borrowed(json), None) => Ok((json, None)),
-        (Cow::Borrowed(json), Some(Cow::Borrowed(bin))) => Ok((json, Some(bin))),
-        _ => Err(MeshError::malformed(Format::Glb, "its chunks could not be split")),
+    let asset: Asset<'_> = top
+        .asset
+        .and_then(|raw| serde_json::from_str(raw.get()).ok())
+        .unwrap_or_default();
+    let version = asset.version.map(|raw| raw.get().trim_matches('"'));
+    // In glTF 1.0 the lists are objects by name; its early files claim no version.
+    let named = top.meshes.is_some_and(|raw| raw.get().starts_with('{'));
+    if named || version.is_some_and(|v| v == "1" || v.starts_with("1.") || v.starts_with("0.")) {
+        return Err(MeshError::Unsupported {
+            format,
+            feature: "glTF 1.0".to_owned(),
+        });
+    }
+    Ok(top)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn required_extensions_are_accepted_by_what_they_are_about() {
+        for name in [
+            "KHR_materials_unlit",
+            "ADOBE_materials_thin_transparency",
+            "EXT_texture_webp",
+            "EXT_mesh_features",
+            "KHR_techniques_webgl",
+            "EXT_structural_metadata",
+            "CESIUM_primitive_outline",
+            "VRMC_springBone",
+            "KHR_meshopt_compression",
+            "KHR_physics_rigid_bodies",
+        ] {
+            assert!(accepted(name), "{name}");
+        }
+        for name in [
+            "VENDOR_new",
+            "EXT_mesh_primitive_restart",
+            "KHR_accessor_float64",
+            "MPEG_accessor_timed",
+            "EXT_implicit_cylinder_region",
+            "materials_",
+        ] {
+            assert!(!accepted(name), "{name}");
+        }
     }
 }

@@ -1,0 +1,233 @@
+//! What a buffer's URI means: bytes inside the document, or a file beside it.
+//!
+//! This is the one place where the names of external buffers are read; the command line, multipart requests and
+//! archives look for files by what [`external_buffers`] lists, and the reader finds them by the same rules.
+
+use super::container::{BYTE_ORDER_MARK, Container};
+use super::schema::{Buffer, Top, text};
+use crate::mesh::Format;
+use serde_json::value::RawValue;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+/// A buffer that lies in a file of its own.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct BufferUri {
+    /// The path relative to the document: percent-decoded, with forward slashes and without `.` segments.
+    path: String,
+    /// The same without percent-decoding, for files whose names have a `%`.
+    literal: String,
+}
+
+impl BufferUri {
+    /// Reads a URI; `None` where the bytes are in the URI itself.
+    pub fn parse(uri: &str) -> Option<Self> {
+        if data(uri).is_some() {
+            return None;
+        }
+        let decoded = String::from_utf8_lossy(&percent_decode(uri.as_bytes())).into_owned();
+        Some(Self {
+            path: plain(&decoded),
+            literal: plain(uri),
+        })
+    }
+
+    /// The path to look at first, and the name the file is known by.
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// Relative paths to look at, in order, none of which leaves the document's folder: the decoded path, the path as
+    /// it is written, and the file's name alone, which is where an absolute path or one that climbs out ends up.
+    pub fn candidates(&self) -> impl Iterator<Item = &str> {
+        let inside = |path: &&str| !path.is_empty() && !path.split('/').any(|s| s == "..");
+        [self.path.as_str(), self.literal.as_str()]
+            .into_iter()
+            .filter(inside)
+            .chain(std::iter::once(last(&self.path)))
+            .filter(inside)
+    }
+
+    /// Finds the file among others: first by the path from `folder`, in which the document lies, then by its last part
+    /// among those for which `by_name` holds.
+    pub fn find<'f, T>(
+        &self,
+        folder: &str,
+        files: &'f [T],
+        name: impl Fn(&T) -> &str,
+        by_name: impl Fn(&T) -> bool,
+    ) -> Option<&'f T> {
+        let at = |path: &str| {
+            let wanted = plain(&format!("{folder}/{path}"));
+            files
+                .iter()
+                .find(|file| plain(name(file)) == wanted || name(file) == path)
+        };
+        let named = || {
+            let wanted = last(&self.path);
+            let same = |file: &&T| by_name(file) && last(&plain(name(file))) == wanted;
+            files.iter().find(same)
+        };
+        at(&self.path).or_else(|| at(&self.literal)).or_else(named)
+    }
+}
+
+/// The files a glTF document refers to, each once, in the order of their paths; none where the bytes are no glTF.
+pub fn external_buffers(bytes: &[u8]) -> Vec<BufferUri> {
+    let document = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+    let format = if bytes.starts_with(b"glTF") {
+        Format::Glb
+    } else if document.trim_ascii_start().starts_with(b"{") {
+        Format::Gltf
+    } else {
+        return Vec::new();
+    };
+    // Whether the document is fit to be read at all is for the reader to say.
+    let Ok(container) = Container::open(bytes, format, |_| Ok(())) else {
+        return Vec::new();
+    };
+    if container.check_counts().is_err() {
+        return Vec::new();
+    }
+    let top: Top<'_> = serde_json::from_str(&container.json).unwrap_or_default();
+    let list = top.buffers.map(RawValue::get).unwrap_or("[]");
+    let buffers: Vec<&RawValue> = serde_json::from_str(list).unwrap_or_default();
+    let found: BTreeMap<String, BufferUri> = buffers
+        .into_iter()
+        .filter_map(|raw| serde_json::from_str::<Buffer<'_>>(raw.get()).ok()?.uri)
+        .filter_map(text)
+        .filter_map(|uri| BufferUri::parse(&uri))
+        .map(|uri| (uri.path.clone(), uri))
+        .collect();
+    found.into_values().collect()
+}
+
+/// What follows `data:`, in any case.
+pub(super) fn data(uri: &str) -> Option<&str> {
+    let scheme = uri.get(..5)?;
+    scheme.eq_ignore_ascii_case("data:").then(|| &uri[5..])
+}
+
+fn last(path: &str) -> &str {
+    path.rsplit('/').next().unwrap_or(path)
+}
+
+/// Forward slashes, without `.` and empty segments, and without `..` as far as there is a segment before it. An
+/// absolute path, a drive letter or a scheme leaves the last part alone: what lies elsewhere is never looked for.
+fn plain(path: &str) -> String {
+    let path = path.replace('\\', "/");
+    let scheme = path
+        .split_once(':')
+        .is_some_and(|(head, _)| !head.is_empty() && head.bytes().all(|b| b.is_ascii_alphanumeric()));
+    let path = if scheme { last(&path) } else { path.as_str() };
+    let mut segments: Vec<&str> = Vec::new();
+    for segment in path.split('/') {
+        match segment {
+            "" | "." => {}
+            ".." if segments.last().is_some_and(|s| *s != "..") => {
+                segments.pop();
+            }
+            other => segments.push(other),
+        }
+    }
+    segments.join("/")
+}
+
+/// `%20` → a blank, and so on; a `%` without two hexadecimal digits stays as it is.
+pub(super) fn percent_decode(text: &[u8]) -> Cow<'_, [u8]> {
+    if !text.contains(&b'%') {
+        return Cow::Borrowed(text);
+    }
+    let mut decoded = Vec::with_capacity(text.len());
+    let mut k = 0;
+    while k < text.len() {
+        let hex = |at: usize| text.get(at).and_then(|&b| (b as char).to_digit(16));
+        match (text[k], hex(k + 1), hex(k + 2)) {
+            (b'%', Some(high), Some(low)) => {
+                decoded.push((high * 16 + low) as u8);
+                k += 3;
+            }
+            (byte, ..) => {
+                decoded.push(byte);
+                k += 1;
+            }
+        }
+    }
+    decoded.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn candidates(uri: &str) -> Vec<String> {
+        let uri = BufferUri::parse(uri).expect("a file");
+        let mut list: Vec<String> = uri.candidates().map(str::to_owned).collect();
+        list.dedup();
+        list
+    }
+
+    #[test]
+    fn many_spellings_of_one_path() {
+        for uri in [
+            "a b.bin",
+            "./a%20b.bin",
+            "././a b.bin",
+            ".\\a%20b.bin",
+            "x/../a b.bin",
+        ] {
+            assert_eq!(BufferUri::parse(uri).expect("a file").path(), "a b.bin", "{uri}");
+        }
+        assert_eq!(candidates("parts\\m%C3%BCde.bin")[0], "parts/müde.bin");
+        assert_eq!(candidates("50%25.bin"), ["50%.bin", "50%25.bin", "50%.bin"]);
+        assert_eq!(BufferUri::parse("DATA:,x"), None);
+    }
+
+    #[test]
+    fn what_lies_elsewhere_is_looked_for_beside_the_document() {
+        for uri in [
+            "/etc/passwd",
+            "../../passwd",
+            "..%2F..%2Fpasswd",
+            "file:///etc/passwd",
+            "C:\\x\\passwd",
+            "http://host/passwd",
+            "a/../../passwd",
+        ] {
+            let paths = candidates(uri);
+            assert!(
+                !paths.is_empty() && !paths.iter().any(|p| p.starts_with('/')),
+                "{uri}: {paths:?}"
+            );
+            assert!(
+                !paths.iter().any(|p| p.split('/').any(|s| s == "..")),
+                "{uri}: {paths:?}"
+            );
+            assert_eq!(paths.last().map(String::as_str), Some("passwd"), "{uri}");
+        }
+        assert!(candidates("..").is_empty());
+    }
+
+    #[test]
+    fn a_file_is_found_from_its_folder_first() {
+        let files = ["one/b.bin", "two/b.bin", "shared/c.bin", "b.bin"];
+        let find = |uri: &str, folder: &str| {
+            let uri = BufferUri::parse(uri).expect("a file");
+            uri.find(folder, &files, |f| f, |f| !f.contains('/')).copied()
+        };
+        assert_eq!(find("b.bin", "two"), Some("two/b.bin"));
+        assert_eq!(find("./b.bin", "three"), Some("b.bin"));
+        assert_eq!(find("../shared/c.bin", "two"), Some("shared/c.bin"));
+        assert_eq!(find("c.bin", "two"), None);
+    }
+
+    #[test]
+    fn external_buffers_are_listed_once_each() {
+        let json = r#"{"buffers":[{"uri":"x.bin"},{"uri":"./x.bin"},{"uri":"data:;base64,AA=="},{},7,{"uri":"y.bin"}]}"#;
+        let list = external_buffers(format!("\u{feff} {json}").as_bytes());
+        let paths: Vec<&str> = list.iter().map(BufferUri::path).collect();
+        assert_eq!(paths, ["x.bin", "y.bin"]);
+        assert!(external_buffers(b"v 0 0 0").is_empty());
+        assert!(external_buffers(b"{").is_empty());
+    }
+}
