@@ -83,6 +83,8 @@ pub struct Report {
     pub classes: BTreeMap<String, usize>,
     /// Shapes in all.
     pub shapes: usize,
+    /// All shapes that were evaluated, in order: the positions in `retrieval.nearest` are positions in this list.
+    pub shape_list: Vec<ShapeName>,
     /// Files that could not be used.
     pub refused: Vec<Refused>,
     /// Classes left out because they have too few shapes.
@@ -99,6 +101,15 @@ pub struct Report {
     pub seconds: f64,
 }
 
+/// What a shape is called.
+#[derive(Debug, Serialize)]
+pub struct ShapeName {
+    /// Its class.
+    pub class: String,
+    /// Its name, unique within the class.
+    pub name: String,
+}
+
 /// The outcome of one protocol.
 #[derive(Debug, Serialize)]
 pub struct Outcome {
@@ -106,7 +117,7 @@ pub struct Outcome {
     pub name: &'static str,
     /// Share of queries answered with the right class, 0 to 1.
     pub top1: f64,
-    /// The evaluation, its queries cut to the worst.
+    /// The evaluation; as text its queries are cut to the worst, as JSON all are there.
     #[serde(flatten)]
     pub evaluation: Evaluation,
 }
@@ -170,7 +181,9 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
         if let Some(dir) = &args.figures {
             figures::write(dir, &evaluation_figures(&evaluation)?)?;
         }
-        evaluation.queries.truncate(args.worst);
+        if !json {
+            evaluation.queries.truncate(args.worst);
+        }
         protocols.push(Outcome {
             name: protocol.name(),
             top1: evaluation.top1(),
@@ -180,6 +193,13 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
     let report = Report {
         classes,
         shapes: shapes.len(),
+        shape_list: shapes
+            .iter()
+            .map(|shape| ShapeName {
+                class: shape.class.clone(),
+                name: shape.name.clone(),
+            })
+            .collect(),
         refused,
         left_out,
         parameters,

@@ -18,6 +18,7 @@ mod error;
 pub mod evaluate;
 mod evaluation_report;
 pub mod export;
+mod exported_baselines;
 mod figures;
 mod files;
 pub mod health;

@@ -3,12 +3,14 @@
 use super::client::{Client, TargetArgs};
 use super::files::MeshFile;
 use super::refused::Refused;
+use super::dictionaries::Exported;
 use super::{CliError, api, dictionaries, output};
 use crate::cancel::Cancel;
 use crate::http::dto::parameters::QueryRankByName;
+use crate::http::dto::query::VerdictDto;
 use crate::mesh::{Limits, read};
-use crate::pipeline::{describe_query, rank_top};
-use crate::ranking::Index;
+use crate::pipeline::{RankedClass, describe_query, judge, judged_by, rank_top};
+use crate::ranking::JUDGED;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -47,7 +49,7 @@ fn rank_by(text: &str) -> Result<QueryRankByName, String> {
 
 enum Source {
     Service(Client),
-    File(Index),
+    File(Box<Exported>),
 }
 
 /// Ranks every file; goes on after one that is refused. With `--json` one line per file: the API's answer and the
@@ -57,7 +59,7 @@ enum Source {
 /// [`CliError::Reported`] where a file was refused; [`CliError::Failed`] where there is nothing to query.
 pub fn run(args: &QueryArgs, json: bool) -> Result<(), CliError> {
     let source = match &args.dictionaries {
-        Some(path) => Source::File(dictionaries::load(path)?.index),
+        Some(path) => Source::File(Box::new(dictionaries::load(path)?)),
         None => Source::Service(args.target.client()?),
     };
     let mut refused = false;
@@ -91,7 +93,7 @@ impl Source {
         let file = MeshFile::load(path, limits.max_bytes)?;
         let answer = match self {
             Self::Service(client) => api::query(client, file, Some(top), rank_by.map(QueryRankByName::name))?,
-            Self::File(index) => rank_against(index, &file, top, rank_by, &limits)?,
+            Self::File(exported) => rank_against(exported, &file, top, rank_by, &limits)?,
         };
         Ok(answer)
     }
@@ -100,12 +102,13 @@ impl Source {
 /// The same stages as the service's query, on an index that came out of a file. The answer has the members of the
 /// API's answer that have a meaning without a service.
 fn rank_against(
-    index: &Index,
+    exported: &Exported,
     file: &MeshFile,
     top: usize,
     rank_by: Option<QueryRankByName>,
     limits: &Limits,
 ) -> Result<Value, CliError> {
+    let index = &exported.index;
     let rank_by = match rank_by.map(QueryRankByName::method) {
         None => index.parameters.rank_by,
         Some(Ok(rank_by)) => rank_by,
@@ -119,13 +122,30 @@ fn rank_against(
     let cancel = Cancel::new();
     let (format, soup) = read(&file.source(), limits)?;
     let description = describe_query(soup, &index.parameters, &cancel, &|_| ())?;
-    let ranking = rank_top(&description.views, index, rank_by, top, &cancel)
+    // The verdict is about the first few, however many are shown.
+    let ranking = rank_top(&description.views, index, rank_by, top.max(JUDGED), &cancel)
         .map_err(crate::pipeline::PipelineError::from)?;
+    let calibration = exported.calibration();
+    let ranked: Vec<RankedClass<'_>> = ranking
+        .classes
+        .iter()
+        .map(|class| RankedClass {
+            label: &class.label,
+            name: &class.label,
+            score: class.score,
+        })
+        .collect();
+    let judged = judge(
+        judged_by(&calibration, &index.parameters, rank_by, &description),
+        &ranked,
+    );
     let classes: Vec<Value> = ranking
         .classes
         .iter()
+        .zip(&judged.p_values)
+        .take(top)
         .enumerate()
-        .map(|(i, c)| {
+        .map(|(i, (c, p_value))| {
             json!({
                 "rank": i + 1,
                 "class": { "name": c.label },
@@ -137,12 +157,17 @@ fn rank_against(
                 "mean_nonzeros": c.mean_nonzeros,
                 "hypothesis": c.hypothesis,
                 "margin": c.margin,
+                "p_value": p_value,
             })
         })
         .collect();
     Ok(json!({
         "name": file.name,
         "classes": classes,
+        "verdict": VerdictDto::from(judged.verdict.clone()),
+        "probability": judged.verdict.probability,
+        "none_of_these": judged.none_of_these,
+        "margin": ranking.confidence,
         "confidence": ranking.confidence,
         "compared": ranking.compared,
         "pruned": ranking.pruned,

@@ -9,8 +9,8 @@ use super::progress::Progress;
 use crate::cancel::Cancel;
 use crate::mesh::Limits;
 use crate::model::{
-    FailedShape, Generation, GenerationClass, GenerationShape, ReindexReport, ReindexScope, RelearnedClass,
-    Shape, SkippedClass,
+    FailedShape, Generation, GenerationClass, GenerationShape, Origin, ReindexReport, ReindexScope,
+    RelearnedClass, Shape, SkippedClass,
 };
 use crate::parameters::Parameters;
 use crate::pipeline::{Description, PipelineError, held_out_scores, learn_model};
@@ -190,7 +190,8 @@ fn learn_class(
     }
     let all: Vec<&Description> = descriptions.iter().map(|(_, description)| description).collect();
     let learnt = learn_model(&all, parameters, request.cancel, &|_, _| {}).and_then(|mut model| {
-        model.report.held_out = held_out_scores(&all, parameters, request.cancel)?;
+        let held_out = held_out_scores(&all, parameters, request.cancel)?;
+        (model.report.held_out, model.report.copies) = (held_out.distinct, held_out.copies);
         Ok(model)
     });
     let model = match learnt {
@@ -223,6 +224,7 @@ fn learn_class(
         Box::new(GenerationClass {
             class: id,
             name: class.class.name.clone(),
+            origin: Origin::Learnt,
             revision: class.class.revision,
             shapes: descriptions.len(),
             dictionary: class.key.clone(),

@@ -13,7 +13,7 @@ pub mod shape;
 pub mod snapshot;
 
 pub use class::{Class, ClassName, ClassNameError};
-pub use generation::{Generation, GenerationClass, GenerationShape};
+pub use generation::{Generation, GenerationClass, GenerationShape, Origin};
 pub use id::{ClassId, IdError, JobId, KeyId, ShapeId, SnapshotId};
 pub use job::{
     FailedShape, Job, JobFailure, JobKind, JobState, ReindexReport, ReindexScope, RelearnedClass,
