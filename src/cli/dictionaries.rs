@@ -298,7 +298,11 @@ mod tests {
         let after = from_bytes(&bytes).unwrap();
         assert_eq!(after.classes, before.classes);
         assert_eq!(after.index.parameters, before.index.parameters);
-        let atoms = |e: &Exported, i: usize| e.index.classes[i].dictionaries[&Channel::Plain].atoms().into_owned();
+        let atoms = |e: &Exported, i: usize| {
+            e.index.classes[i].dictionaries[&Channel::Plain]
+                .atoms()
+                .into_owned()
+        };
         assert_eq!(atoms(&after, 1), atoms(&before, 1));
         assert_eq!(after.reports, before.reports);
         let (read, written) = (after.baselines.unwrap(), before.baselines.unwrap());
@@ -319,7 +323,10 @@ mod tests {
         metadata["format"] = 1.into();
         let tensors = SafeTensors::deserialize(&bytes).unwrap();
         let views = tensors.tensors();
-        let old = safetensors::serialize(views, Some(HashMap::from([(KEY.to_owned(), metadata.to_string())])));
+        let old = safetensors::serialize(
+            views,
+            Some(HashMap::from([(KEY.to_owned(), metadata.to_string())])),
+        );
         let old = from_bytes(&old.unwrap()).unwrap();
         assert!(length > 0 && old.baselines.is_none() && old.reports.is_empty());
         assert_eq!(old.absent().len(), 3, "{:?}", old.absent());

@@ -5,7 +5,9 @@
 //! `<class>/signature_distances` and `<class>/bag_of_words` (f32, histograms).
 
 use super::dictionaries::Tensors;
-use crate::baseline::{BaselineClass, BaselineIndex, BaselineModel, BaselineShape, SignatureDistances, Vocabulary};
+use crate::baseline::{
+    BaselineClass, BaselineIndex, BaselineModel, BaselineShape, SignatureDistances, Vocabulary,
+};
 use faer::Mat;
 use safetensors::tensor::{Dtype, SafeTensors};
 use serde::{Deserialize, Serialize};
@@ -37,21 +39,39 @@ pub(super) fn write(index: &BaselineIndex, tensors: &mut Tensors) -> Baselines {
     for class in &index.classes {
         let count = class.shapes.len();
         let mut add = |what: &str, kind: Dtype, width: usize, bytes: Vec<u8>| {
-            tensors.insert(format!("{}/{what}", class.label), (kind, vec![count, width], bytes));
+            tensors.insert(
+                format!("{}/{what}", class.label),
+                (kind, vec![count, width], bytes),
+            );
         };
-        let width = class.shapes.iter().map(|s| s.eigenvalues.len()).max().unwrap_or(0);
+        let width = class
+            .shapes
+            .iter()
+            .map(|s| s.eigenvalues.len())
+            .max()
+            .unwrap_or(0);
         let filled = class.shapes.iter().flat_map(|s| {
             let rest = std::iter::repeat_n(f64::NAN, width - s.eigenvalues.len());
             s.eigenvalues.iter().copied().chain(rest)
         });
-        add(EIGENVALUES, Dtype::F64, width, filled.flat_map(f64::to_le_bytes).collect());
+        add(
+            EIGENVALUES,
+            Dtype::F64,
+            width,
+            filled.flat_map(f64::to_le_bytes).collect(),
+        );
         for (what, values) in [
             (DISTANCES, (|s| &s.distances) as fn(&BaselineShape) -> &Vec<f32>),
             (WORDS, |s| &s.words),
         ] {
             let width = class.shapes.first().map_or(0, |s| values(s).len());
             let all = class.shapes.iter().flat_map(values);
-            add(what, Dtype::F32, width, all.flat_map(|v| v.to_le_bytes()).collect());
+            add(
+                what,
+                Dtype::F32,
+                width,
+                all.flat_map(|v| v.to_le_bytes()).collect(),
+            );
         }
     }
     let shapes = index.classes.iter().map(|class| {
@@ -78,7 +98,12 @@ pub(super) fn read(described: &Baselines, tensors: &SafeTensors<'_>) -> Result<B
         let histograms = Rows::<f32>::read(tensors, &of(WORDS), Some(names.len()))?;
         let shapes = names.iter().enumerate().map(|(i, label)| BaselineShape {
             label: label.clone(),
-            eigenvalues: eigenvalues.row(i).iter().copied().take_while(|v| !v.is_nan()).collect(),
+            eigenvalues: eigenvalues
+                .row(i)
+                .iter()
+                .copied()
+                .take_while(|v| !v.is_nan())
+                .collect(),
             distances: distances.row(i).to_vec(),
             words: histograms.row(i).to_vec(),
         });
@@ -117,14 +142,24 @@ trait Number: Sized {
 impl Number for f64 {
     const KIND: Dtype = Dtype::F64;
     fn all(bytes: &[u8]) -> Vec<Self> {
-        bytes.as_chunks().0.iter().map(|b| Self::from_le_bytes(*b)).collect()
+        bytes
+            .as_chunks()
+            .0
+            .iter()
+            .map(|b| Self::from_le_bytes(*b))
+            .collect()
     }
 }
 
 impl Number for f32 {
     const KIND: Dtype = Dtype::F32;
     fn all(bytes: &[u8]) -> Vec<Self> {
-        bytes.as_chunks().0.iter().map(|b| Self::from_le_bytes(*b)).collect()
+        bytes
+            .as_chunks()
+            .0
+            .iter()
+            .map(|b| Self::from_le_bytes(*b))
+            .collect()
     }
 }
 
@@ -134,11 +169,13 @@ impl<T: Number> Rows<T> {
             .tensor(name)
             .map_err(|_| format!("tensor '{name}' is missing"))?;
         match *tensor.shape() {
-            [rows, width] if tensor.dtype() == T::KIND && count.is_none_or(|count| count == rows) => Ok(Self {
-                values: T::all(tensor.data()),
-                count: rows,
-                width,
-            }),
+            [rows, width] if tensor.dtype() == T::KIND && count.is_none_or(|count| count == rows) => {
+                Ok(Self {
+                    values: T::all(tensor.data()),
+                    count: rows,
+                    width,
+                })
+            }
             _ => Err(format!("tensor '{name}' does not go with the metadata")),
         }
     }

@@ -2,8 +2,8 @@
 
 use super::dictionaries::{Exported, load};
 use super::{CliError, output};
-use crate::config::DEFAULT_DATA;
 use crate::baseline::BaselineIndex;
+use crate::config::DEFAULT_DATA;
 use crate::model::{ClassName, Generation, GenerationClass, Origin};
 use crate::store::{Store, StoreError, StoreOptions};
 use serde_json::json;

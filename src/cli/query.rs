@@ -1,9 +1,9 @@
 //! `shapelex query`: which class a mesh belongs to.
 
 use super::client::{Client, TargetArgs};
+use super::dictionaries::Exported;
 use super::files::MeshFile;
 use super::refused::Refused;
-use super::dictionaries::Exported;
 use super::{CliError, api, dictionaries, output};
 use crate::cancel::Cancel;
 use crate::http::dto::parameters::QueryRankByName;

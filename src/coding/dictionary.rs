@@ -95,11 +95,7 @@ impl Dictionary {
     ///
     /// # Errors
     /// As [`Dictionary::new`]; [`CodingError::DimensionMismatch`] where the last atom is cut short.
-    pub fn single(
-        values: Vec<f32>,
-        dimension: usize,
-        room: &Arc<PreparedRoom>,
-    ) -> Result<Self, CodingError> {
+    pub fn single(values: Vec<f32>, dimension: usize, room: &Arc<PreparedRoom>) -> Result<Self, CodingError> {
         let rest = values.len() % dimension.max(1);
         if dimension == 0 || rest != 0 {
             return Err(CodingError::DimensionMismatch {

@@ -1,11 +1,11 @@
 //! The dictionary half of online learning: running sums, block-coordinate descent on the atoms, and what replaces
 //! atoms of no use (Mairal et al. 2010, Algorithm 2 and Section 3.4).
 
+use super::Codes;
 use super::dispatch::{Kernel, fastest};
 use super::dot::dot;
 use super::initialise::jittered;
 use super::lasso::column;
-use super::Codes;
 use super::prepared::Prepared;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};

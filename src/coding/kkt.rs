@@ -104,9 +104,9 @@ pub(super) fn coordinate_descent(problem: &Problem<'_>, gram: MatRef<'_, f64>, c
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coding::prepared::Prepared;
     use crate::cancel::Cancel;
     use crate::coding::encode;
+    use crate::coding::prepared::Prepared;
     use crate::coding::scan::Rows;
     use faer::Mat;
 

@@ -14,7 +14,9 @@ use crate::jobs::LiveIndex;
 use crate::mesh::TriangleSoup;
 use crate::model::ClassId;
 use crate::parameters::{Channel, Parameters};
-use crate::pipeline::{Description, Stage, StageSpan, describe_plain, describe_query, judged_by, rank, rank_top};
+use crate::pipeline::{
+    Description, Stage, StageSpan, describe_plain, describe_query, judged_by, rank, rank_top,
+};
 use crate::ranking::{Index, JUDGED, NotJudged, SIGNIFICANCE};
 use crate::spectral;
 use crate::store::StoreError;

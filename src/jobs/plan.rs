@@ -1,9 +1,7 @@
 //! Which classes a reindex learns, keeps or leaves out.
 
 use super::failure::ReindexError;
-use crate::model::{
-    Class, ClassId, Generation, GenerationClass, Origin, ReindexScope, Shape, SkippedClass,
-};
+use crate::model::{Class, ClassId, Generation, GenerationClass, Origin, ReindexScope, Shape, SkippedClass};
 use crate::parameters::Parameters;
 use crate::store::{Store, StoreError};
 use std::collections::BTreeMap;

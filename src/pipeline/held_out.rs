@@ -35,7 +35,11 @@ pub fn held_out_scores(
     }
     let groups = groups(shapes);
     let distinct = groups.iter().any(|group| *group != groups[0]);
-    let groups = if distinct { groups } else { (0..shapes.len()).collect() };
+    let groups = if distinct {
+        groups
+    } else {
+        (0..shapes.len()).collect()
+    };
     let scores = scores(shapes, &groups, parameters, cancel)?;
     Ok(if distinct {
         HeldOutScores {

@@ -15,7 +15,10 @@ const EIGENVALUES: usize = 13;
 /// The group of each shape, numbered from 0 in the order of their first shapes: near copies, and what is connected by
 /// them, are in one.
 pub fn groups(shapes: &[&Description]) -> Vec<usize> {
-    let logarithms: Vec<Vec<f64>> = shapes.iter().map(|shape| logarithms(&shape.eigenvalues)).collect();
+    let logarithms: Vec<Vec<f64>> = shapes
+        .iter()
+        .map(|shape| logarithms(&shape.eigenvalues))
+        .collect();
     let mut group: Vec<usize> = (0..shapes.len()).collect();
     for i in 0..shapes.len() {
         for j in 0..i {

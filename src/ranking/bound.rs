@@ -110,7 +110,11 @@ fn residuals(dictionary: &Dictionary, points: &Mat<f64>, codes: &Codes, residual
         let first = residuals.len();
         residuals.extend_from_slice(points.col_as_slice(g));
         let code = codes.offsets[g]..codes.offsets[g + 1];
-        dictionary.subtract(&codes.atoms[code.clone()], &codes.values[code], &mut residuals[first..]);
+        dictionary.subtract(
+            &codes.atoms[code.clone()],
+            &codes.values[code],
+            &mut residuals[first..],
+        );
     }
 }
 

@@ -103,7 +103,8 @@ impl Calibration {
             }
         }
         if nonconformities.len() < FEWEST {
-            let with_copies = nonconformities.len() + copied.iter().map(|(_, logs)| logs.len()).sum::<usize>();
+            let with_copies =
+                nonconformities.len() + copied.iter().map(|(_, logs)| logs.len()).sum::<usize>();
             return Err(if with_copies < FEWEST {
                 NotJudged::TooFewShapes
             } else {
@@ -192,8 +193,8 @@ fn common_variance(classes: &[(&str, Vec<f64>)]) -> f64 {
 
 /// The level of some shapes of a class, its variance shrunk towards the common one.
 fn level(logs: &[f64], common: f64) -> Level {
-    let variance =
-        (spread(logs) + COMMON_DEVIATION_WEIGHT * common) / (logs.len() as f64 - 1.0 + COMMON_DEVIATION_WEIGHT);
+    let variance = (spread(logs) + COMMON_DEVIATION_WEIGHT * common)
+        / (logs.len() as f64 - 1.0 + COMMON_DEVIATION_WEIGHT);
     Level {
         mean: mean(logs),
         deviation: variance.sqrt().max(LEAST_DEVIATION),
@@ -279,9 +280,13 @@ mod tests {
             scores: &[],
             copies: &walk,
         };
-        let calibration = Calibration::fit([distinct("cat", &cats), distinct("dog", &dogs), walking]).expect("enough");
+        let calibration =
+            Calibration::fit([distinct("cat", &cats), distinct("dog", &dogs), walking]).expect("enough");
         // Copies widen nobody's level.
-        assert_eq!(calibration.p_value("cat", 0.33), two_classes().p_value("cat", 0.33));
+        assert_eq!(
+            calibration.p_value("cat", 0.33),
+            two_classes().p_value("cat", 0.33)
+        );
         assert_eq!(calibration.p_value("cow", 0.41), Err(NotJudged::NearCopies));
         assert_eq!(calibration.p_value("cow", 0.9), Ok(calibration.least_p_value()));
         assert!(!calibration.judge([("cat", 0.5), ("cow", 0.51)]).none_of_these);

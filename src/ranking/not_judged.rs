@@ -23,7 +23,9 @@ impl fmt::Display for NotJudged {
             Self::Open => "the surface is open, and only whole shapes are judged",
             Self::OtherMeasure => "only rankings by the index's own measure are judged",
             Self::TooFewShapes => "too few training shapes to judge by",
-            Self::NearCopies => "the training shapes are near copies of one pose, which tell nothing of others",
+            Self::NearCopies => {
+                "the training shapes are near copies of one pose, which tell nothing of others"
+            }
             Self::Partial => "not all classes were compared with in time",
         })
     }

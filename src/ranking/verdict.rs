@@ -83,7 +83,10 @@ impl Verdict {
         let others = ranked.iter().skip(1).filter(|c| !possible(c));
         let probability = certainty(others, least);
         let sure = probability.map_or(String::new(), |p| {
-            format!(" (at least {:.0} % of such answers are right)", (100.0 * p).floor())
+            format!(
+                " (at least {:.0} % of such answers are right)",
+                (100.0 * p).floor()
+            )
         });
         Self {
             kind: if names.len() == 1 {
@@ -152,13 +155,26 @@ mod tests {
         assert_eq!((two.kind, two.probability), (VerdictKind::Several, Some(0.98)));
         assert!(two.text.starts_with("cat or dog (at least 98 %"), "{}", two.text);
         let none = judge(&[("michael", Ok(0.02)), ("dog", Ok(0.01))]);
-        assert_eq!((none.kind, none.probability), (VerdictKind::NoneOfThese, Some(0.98)));
+        assert_eq!(
+            (none.kind, none.probability),
+            (VerdictKind::NoneOfThese, Some(0.98))
+        );
         assert_eq!(none.text, "none of the known classes; nearest: michael");
         let unknown = judge(&[("cat", FEW), ("dog", Ok(0.01))]);
-        assert_eq!((unknown.kind, unknown.probability), (VerdictKind::NotJudged, None));
-        assert!(unknown.text.starts_with("nearest: cat (not judged: "), "{}", unknown.text);
+        assert_eq!(
+            (unknown.kind, unknown.probability),
+            (VerdictKind::NotJudged, None)
+        );
+        assert!(
+            unknown.text.starts_with("nearest: cat (not judged: "),
+            "{}",
+            unknown.text
+        );
         let copies = judge(&[("cat", Ok(0.02)), ("dog", Err(NotJudged::NearCopies))]);
-        assert_eq!((copies.kind, copies.reason), (VerdictKind::NotJudged, Some(NotJudged::NearCopies)));
+        assert_eq!(
+            (copies.kind, copies.reason),
+            (VerdictKind::NotJudged, Some(NotJudged::NearCopies))
+        );
         let open = Verdict::not_judged(Some("cat"), NotJudged::Open);
         assert!(open.text.contains("open"), "{}", open.text);
     }

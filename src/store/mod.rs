@@ -44,7 +44,7 @@ mod usage;
 pub use api_keys::MAX_KEYS;
 pub use backend::Backend;
 pub use catalogue::AddedShape;
-pub use dictionaries::Dictionaries;
+pub use dictionaries::{Dictionaries, PREPARED_BYTES};
 pub use error::StoreError;
 pub use garbage::Garbage;
 pub use idempotency::Remembered;

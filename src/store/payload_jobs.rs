@@ -3,8 +3,8 @@
 use super::payload::{from_json, instant, only, pack, to_json, unpack};
 use super::record::{Family, Record};
 use crate::model::{
-    ClassId, ClassName, Generation, GenerationClass, GenerationShape, Job, JobFailure, JobId, JobState, Origin,
-    ShapeId, Step,
+    ClassId, ClassName, Generation, GenerationClass, GenerationShape, Job, JobFailure, JobId, JobState,
+    Origin, ShapeId, Step,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;

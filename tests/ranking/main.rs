@@ -3,8 +3,6 @@
 #[path = "../../benches/scale/zoo.rs"]
 mod zoo;
 
-
-
 use shapelex::cancel::Cancel;
 use shapelex::parameters::{Channel, Hypothesis, RankBy};
 use shapelex::ranking::{Index, IndexedShape, Ranking, View, rank, rank_top};

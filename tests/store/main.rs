@@ -4,6 +4,7 @@
 mod catalogue;
 mod faults;
 mod formats;
+mod imports;
 mod jobs;
 mod recovery;
 mod snapshots;

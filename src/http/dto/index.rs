@@ -1,7 +1,7 @@
 //! The index on the wire.
 
-use super::class::IndexState;
 use super::PageQuery;
+use super::class::IndexState;
 use super::parameters::ParametersDto;
 use crate::model::Origin;
 use serde::{Deserialize, Serialize};

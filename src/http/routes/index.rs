@@ -50,7 +50,9 @@ pub async fn get_index(
     }
     let present = classes.iter().filter_map(|class| learnt.get(&class.id));
     let bytes = present.map(|(class, _)| class.bytes).sum();
-    let found = classes.into_iter().filter(|class| after.is_none_or(|after| class.id > after));
+    let found = classes
+        .into_iter()
+        .filter(|class| after.is_none_or(|after| class.id > after));
     let page = Page::cut(
         found.take(limit + 1).collect(),
         limit,
