@@ -5,14 +5,14 @@ use super::dto::class::ClassRef;
 use super::dto::query::{DetailsName, QueryAnswer, QueryOptions, RankedClass, RankedShape, SampledView};
 use super::metrics;
 use super::problem::{Code, Problem};
-use super::problem_from::{baselines_missing, index_empty};
+use super::problem_from::{baselines_missing, baselines_not_imported, index_empty};
 use super::ranked::Ranked;
 use super::state::Parts;
 use super::time_limit::{TimeView, rank_until};
 use super::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
 use crate::mesh::TriangleSoup;
-use crate::model::ClassId;
+use crate::model::{ClassId, Generation, Origin};
 use crate::parameters::{Channel, Parameters};
 use crate::pipeline::{
     Description, Stage, StageSpan, describe_plain, describe_query, judged_by, rank, rank_top,
@@ -88,14 +88,14 @@ pub fn answer(
             let baselines = live
                 .baselines
                 .as_ref()
-                .ok_or_else(|| baselines_missing(named.name()))?;
+                .ok_or_else(|| no_baselines(generation, named.name()))?;
             let description =
                 describe_plain(soup, parameters, stop, &observer).map_err(|e| timely(e.into()))?;
             observer(Stage::Ranking);
             let present = |label: &str| names.contains_key(label);
             let nearest = baselines
                 .nearest(&description, baseline, &present)
-                .ok_or_else(|| baselines_missing(named.name()))?;
+                .ok_or_else(|| no_baselines(generation, named.name()))?;
             let mut ranked = Ranked::from(nearest);
             let left = without(&index, &ranked);
             let verdict = ranked.judge(Err(NotJudged::OtherMeasure), name_of);
@@ -170,6 +170,18 @@ pub fn answer(
         parameters: parameters.clone().into(),
         timings_ms: timings(&stages, work.waited, began.elapsed()),
     })
+}
+
+fn no_baselines(generation: &Generation, rank_by: &str) -> Problem {
+    if generation
+        .classes
+        .iter()
+        .all(|class| class.origin == Origin::Imported)
+    {
+        baselines_not_imported(rank_by)
+    } else {
+        baselines_missing(rank_by)
+    }
 }
 
 /// Labels of the classes that a baseline knows no shape of: imported ones, where the file had nothing for it.
