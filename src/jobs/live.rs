@@ -1,5 +1,6 @@
 //! The index in memory.
 
+use super::trim;
 use crate::baseline::BaselineIndex;
 use crate::model::Generation;
 use crate::ranking::{Calibration, Index, IndexedClass, NotJudged};
@@ -59,6 +60,7 @@ pub(super) fn load(store: &Store) -> Result<(LiveIndex, bool), StoreError> {
     });
     let lost = match loaded {
         Ok(Some((generation, index, baselines))) => {
+            trim::after_loading(store, &generation)?;
             let live = LiveIndex {
                 calibration: calibration(&generation),
                 generation: Some(generation),

@@ -6,6 +6,7 @@ use super::failure::{ReindexError, code};
 use super::live::{LiveIndex, calibration, load_baselines};
 use super::plan::{Plan, ToLearn, plan, shape_key, skipped};
 use super::progress::Progress;
+use super::trim;
 use crate::cancel::Cancel;
 use crate::mesh::Limits;
 use crate::model::{
@@ -304,5 +305,11 @@ fn switch(
         index,
         baselines,
     }));
+    if let Some(generation) = &live.load().generation
+        && let Err(error) = trim::after_loading(store, generation)
+    {
+        // The store has closed and not opened again: the next request tells.
+        tracing::error!(%error, "the store's cache could not be dropped");
+    }
     Ok(Some(number))
 }

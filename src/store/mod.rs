@@ -190,6 +190,16 @@ impl Inner {
 }
 
 impl Store {
+    /// Lets go of what the engine keeps in memory of its records; it is opened anew, and requests wait for that.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`] where it cannot be opened again.
+    pub fn drop_cache(&self) -> Result<(), StoreError> {
+        // No write is under way while the writer is held.
+        let _writer = self.inner.writer();
+        self.inner.backend.reopen(&mut || Ok(()))
+    }
+
     /// The data directory.
     pub fn path(&self) -> &Path {
         &self.inner.path

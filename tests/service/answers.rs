@@ -194,7 +194,7 @@ async fn a_score_is_computed_again_from_the_export_and_the_samples() {
             .collect();
         let mean = signals.iter().map(|s| lasso(&atoms, s, lambda)).sum::<f64>() / signals.len() as f64;
         let score = class["score"].as_f64().unwrap();
-        assert!((mean - score).abs() < 1e-8, "{mean} and {score}");
+        assert!((mean - score).abs() < 1e-6, "{mean} and {score}");
     }
 }
 
