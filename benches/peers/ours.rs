@@ -132,7 +132,7 @@ impl State {
         let started = Instant::now();
         let (dictionary, report) = learn(&[signals.as_ref()], &learning, &Cancel::new(), &|_, _| ())?;
         let ms = milliseconds(started);
-        write_matrix(Path::new(text(command, "dictionary")?), dictionary.atoms())?;
+        write_matrix(Path::new(text(command, "dictionary")?), &dictionary.atoms())?;
         Ok(json!({ "ms": ms, "atoms": report.atoms }))
     }
 
@@ -199,7 +199,7 @@ impl State {
         for class in &index.classes {
             write_matrix(
                 &out.join(&class.label),
-                class.dictionaries[&Channel::Plain].atoms(),
+                &class.dictionaries[&Channel::Plain].atoms(),
             )?;
         }
         self.index = Some(index);

@@ -108,7 +108,7 @@ fn shapes(sizes: &[usize]) -> Outcome<()> {
         println!(
             "{}",
             json!({ "shapes": count, "describe_ms": describe_ms / described.len() as f64 * count as f64,
-                "learn_ms": learn_ms, "calibrate_ms": (!held_out.is_empty()).then_some(calibrate_ms),
+                "learn_ms": learn_ms, "calibrate_ms": (!held_out.distinct.is_empty()).then_some(calibrate_ms),
                 "resident_kilobytes": resident_kilobytes() })
         );
     }

@@ -145,7 +145,7 @@ fn learnt(number: usize) -> Result<Mat<f64>, String> {
     })?;
     let model =
         learn_model(&[&described], &parameters, &Cancel::new(), &|_, _| ()).map_err(|e| e.to_string())?;
-    Ok(model.dictionaries[&Channel::Plain].atoms().clone())
+    Ok(model.dictionaries[&Channel::Plain].atoms().into_owned())
 }
 
 fn queried(number: usize) -> Result<Mat<f64>, String> {

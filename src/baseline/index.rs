@@ -143,6 +143,20 @@ impl BaselineShape {
 }
 
 impl BaselineIndex {
+    /// Memory it takes, in bytes, about.
+    pub fn resident_bytes(&self) -> usize {
+        let of_shape = |s: &BaselineShape| {
+            size_of::<BaselineShape>()
+                + s.label.capacity()
+                + size_of_val(s.eigenvalues.as_slice())
+                + size_of_val(s.distances.as_slice())
+                + size_of_val(s.words.as_slice())
+        };
+        let words = &self.model.vocabulary.words;
+        let shapes = self.classes.iter().flat_map(|class| &class.shapes);
+        size_of::<f64>() * words.nrows() * words.ncols() + shapes.map(of_shape).sum::<usize>()
+    }
+
     /// All training shapes of the classes that are kept, nearest first; ties are broken by label. The query must be
     /// described as a training shape is, by [`describe_plain`](crate::pipeline::describe_plain): histograms of
     /// differently sampled signatures do not compare. `None` where it has no signatures of the words' length.

@@ -5,8 +5,8 @@ use super::evaluate::LabelledShape;
 use crate::cancel::Cancel;
 use crate::parameters::Parameters;
 use crate::pipeline::prepared::OPEN_ABOVE;
-use crate::pipeline::{Description, PipelineError, held_out_scores, learn_model};
-use crate::ranking::{Calibration, Index, IndexedClass, SIGNIFICANCE, rank};
+use crate::pipeline::{Description, HeldOutScores, PipelineError, held_out_scores, learn_model};
+use crate::ranking::{Calibration, Candidate, HeldOut, Index, IndexedClass, SIGNIFICANCE, Verdict, rank};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -66,6 +66,13 @@ pub struct OpenSet {
     pub mean_set_size: f64,
     /// Coverage at other levels, ascending.
     pub by_level: Vec<AtLevel>,
+    /// Queries of indexed classes whose verdict names classes and has a probability, and those of them for which one of
+    /// the named classes is the true one.
+    #[serde(default)]
+    pub named_right: Share,
+    /// Sum of these verdicts' probabilities, for comparison with the count of right ones: it is meant to be no larger.
+    #[serde(default)]
+    pub promised_right: f64,
     /// Classes left out because they have fewer than three shapes.
     pub left_out: Vec<String>,
 }
@@ -81,6 +88,8 @@ impl OpenSet {
         let other_sets = other.mean_set_size * other.covered.total as f64;
         sum(&mut self.covered, &other.covered);
         sum(&mut self.refused_known, &other.refused_known);
+        sum(&mut self.named_right, &other.named_right);
+        self.promised_right += other.promised_right;
         sum(&mut self.refused_unknown, &other.refused_unknown);
         for (class, share) in &other.refused_by_class {
             sum(self.refused_by_class.entry(class.clone()).or_default(), share);
@@ -134,7 +143,7 @@ pub fn evaluate_open_set(
     let total = train.len() + queried.len();
     let done = std::sync::atomic::AtomicUsize::new(0);
     let tick = || progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, total);
-    let learnt: Vec<(IndexedClass, Vec<f64>)> = train
+    let learnt: Vec<(IndexedClass, HeldOutScores)> = train
         .par_iter()
         .map(|(class, list)| {
             let training: Vec<&Description> = list.iter().map(|&i| &shapes[i].training).collect();
@@ -148,7 +157,7 @@ pub fn evaluate_open_set(
             Ok((class, held_out))
         })
         .collect::<Result<_, PipelineError>>()?;
-    let held_out: BTreeMap<String, Vec<f64>> = learnt
+    let held_out: BTreeMap<String, HeldOutScores> = learnt
         .iter()
         .map(|(class, scores)| (class.label.clone(), scores.clone()))
         .collect();
@@ -177,8 +186,13 @@ pub fn evaluate_open_set(
             held_out
                 .iter()
                 .filter(|(class, _)| !without.contains(*class))
-                .map(|(class, scores)| (class.as_str(), scores.as_slice())),
+                .map(|(class, scores)| HeldOut {
+                    label: class,
+                    scores: &scores.distinct,
+                    copies: &scores.copies,
+                }),
         )
+        .ok()
     };
     let Some(full) = calibration(&BTreeSet::new()) else {
         return Ok(None);
@@ -203,7 +217,7 @@ pub fn evaluate_open_set(
         let verdict = full.judge(ranked.iter().map(|(label, score)| (label.as_str(), *score)));
         let possible_at = |level: f64| -> Vec<&str> {
             let judged = ranked.iter().zip(&verdict.p_values);
-            let kept = judged.filter(|(_, p)| p.is_none_or(|p| p > level));
+            let kept = judged.filter(|(_, p)| p.is_err() || p.is_ok_and(|p| p > level));
             kept.map(|((label, _), _)| label.as_str()).collect()
         };
         let set = possible_at(SIGNIFICANCE);
@@ -214,6 +228,17 @@ pub fn evaluate_open_set(
         possible += set.len();
         result.covered.add(set.iter().any(|label| truth.contains(*label)));
         result.refused_known.add(verdict.none_of_these);
+        let candidates: Vec<Candidate<'_>> = ranked
+            .iter()
+            .zip(verdict.p_values)
+            .map(|((name, _), p_value)| Candidate { name, p_value })
+            .collect();
+        let verdict = Verdict::of(&candidates, full.least_p_value());
+        if let (false, Some(probability)) = (verdict.named.is_empty(), verdict.probability) {
+            let right = verdict.named.iter().any(|&i| truth.contains(candidates[i].name));
+            result.named_right.add(right);
+            result.promised_right += probability;
+        }
     }
     result.mean_set_size = possible as f64 / result.covered.total.max(1) as f64;
     for class in members.keys() {

@@ -114,7 +114,8 @@ pub struct RetrievalOutcome {
     pub total: usize,
     /// Means over the queries.
     pub measures: RetrievalMeasures,
-    /// For every query the number of its nearest other shape.
+    /// For every shape, in the order they were given, the position in that order of its nearest other shape; `None` for a
+    /// single one.
     pub nearest: Vec<Option<usize>>,
 }
 

@@ -1,13 +1,18 @@
 //! Dictionaries in a safetensors file, readable from Python.
 //!
 //! One tensor per class and channel, named `<class>/<channel>`: M rows × L columns of little-endian f32, one atom per
-//! column. The metadata has one key, `shapelex`: JSON with the file's format, the parameters and the classes. Classes'
-//! names may hold a `/`, so the channel is what follows the last one.
+//! column. The metadata has one key, `shapelex`: JSON with the file's format, the parameters, the classes, and since format
+//! 2 what learning did (the held-out scores that answers are calibrated by among it) and what the baselines need
+//! ([`exported_baselines`](super::exported_baselines)). Classes' names may hold a `/`, so the channel is what follows the
+//! last one.
 
 use super::CliError;
+use super::exported_baselines::{self, Baselines};
+use crate::baseline::BaselineIndex;
 use crate::coding::Dictionary;
 use crate::parameters::{Channel, Parameters};
-use crate::ranking::{Index, IndexedClass};
+use crate::pipeline::ModelReport;
+use crate::ranking::{Calibration, Index, IndexedClass, NotJudged};
 use faer::Mat;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
@@ -16,7 +21,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// The file format's number; a reader refuses greater ones.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// The metadata's only key.
 const KEY: &str = "shapelex";
 
@@ -27,7 +32,36 @@ pub struct Exported {
     pub index: Index,
     /// What the file says about each class.
     pub classes: Vec<ExportedClass>,
+    /// What learning did, by class; empty in a file of format 1.
+    pub reports: BTreeMap<String, ModelReport>,
+    /// What the baselines need; `None` where the index was without, and in a file of format 1.
+    pub baselines: Option<BaselineIndex>,
 }
+
+impl Exported {
+    /// What an index learnt from shapes has and this does not, one clause each.
+    pub fn absent(&self) -> Vec<&'static str> {
+        let mut absent = vec!["the training shapes"];
+        if self.reports.values().all(|report| report.held_out.is_empty()) {
+            absent.push("the calibration, so no answer is judged");
+        }
+        if self.baselines.is_none() {
+            absent.push("what the baselines need, so queries rank by sparse coding only");
+        }
+        absent
+    }
+
+    /// What scores shapes of the classes have.
+    ///
+    /// # Errors
+    /// Why that is not known: too few were learnt from, or the file does not say.
+    pub fn calibration(&self) -> Result<Calibration, NotJudged> {
+        Calibration::fit(self.reports.iter().map(|(name, report)| report.held_out(name)))
+    }
+}
+
+/// Name → type, shape and bytes of a tensor.
+pub(super) type Tensors = BTreeMap<String, (Dtype, Vec<usize>, Vec<u8>)>;
 
 /// What a file says about a class.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -43,6 +77,10 @@ struct Metadata {
     format: u32,
     parameters: Parameters,
     classes: Vec<ExportedClass>,
+    #[serde(default)]
+    reports: BTreeMap<String, ModelReport>,
+    #[serde(default)]
+    baselines: Option<Baselines>,
 }
 
 /// Writes a file's contents. Equal input gives equal bytes.
@@ -51,28 +89,34 @@ struct Metadata {
 /// [`CliError::Failed`] where the format's library refuses.
 pub fn to_bytes(exported: &Exported) -> Result<Vec<u8>, CliError> {
     let failed = |error: &dyn std::fmt::Display| CliError::Failed(format!("writing safetensors: {error}"));
-    let metadata = Metadata {
-        format: FORMAT,
-        parameters: exported.index.parameters.clone(),
-        classes: exported.classes.clone(),
-    };
-    let metadata = serde_json::to_string(&metadata).map_err(|error| failed(&error))?;
-    let mut tensors: BTreeMap<String, (Vec<usize>, Vec<u8>)> = BTreeMap::new();
+    let mut tensors = Tensors::new();
     for class in &exported.index.classes {
         for (channel, dictionary) in &class.dictionaries {
             let atoms = dictionary.atoms();
+            let atoms = atoms.as_ref();
             let (rows, columns) = (atoms.nrows(), atoms.ncols());
             let bytes = (0..rows)
                 .flat_map(|i| (0..columns).map(move |j| atoms[(i, j)] as f32))
                 .flat_map(f32::to_le_bytes)
                 .collect();
             let name = format!("{}/{}", class.label, channel_name(*channel));
-            tensors.insert(name, (vec![rows, columns], bytes));
+            tensors.insert(name, (Dtype::F32, vec![rows, columns], bytes));
         }
     }
+    let metadata = Metadata {
+        format: FORMAT,
+        parameters: exported.index.parameters.clone(),
+        classes: exported.classes.clone(),
+        reports: exported.reports.clone(),
+        baselines: exported
+            .baselines
+            .as_ref()
+            .map(|baselines| exported_baselines::write(baselines, &mut tensors)),
+    };
+    let metadata = serde_json::to_string(&metadata).map_err(|error| failed(&error))?;
     let views = tensors
         .iter()
-        .map(|(name, (shape, bytes))| Ok((name, TensorView::new(Dtype::F32, shape.clone(), bytes)?)))
+        .map(|(name, (kind, shape, bytes))| Ok((name, TensorView::new(*kind, shape.clone(), bytes)?)))
         .collect::<Result<Vec<_>, safetensors::SafeTensorError>>()
         .map_err(|error| failed(&error))?;
     safetensors::serialize(views, Some(HashMap::from([(KEY.to_owned(), metadata)])))
@@ -116,9 +160,9 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Exported, String> {
         format: u32,
     }
     let version: Version = serde_json::from_str(metadata).map_err(|error| unreadable(&error))?;
-    if version.format != FORMAT {
+    if !(1..=FORMAT).contains(&version.format) {
         return Err(format!(
-            "the file has format {}, this shapelex reads format {FORMAT}",
+            "the file has format {}, this shapelex reads formats 1 to {FORMAT}; use a newer one",
             version.format
         ));
     }
@@ -152,12 +196,19 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Exported, String> {
             })
         })
         .collect::<Result<Vec<_>, String>>()?;
+    let baselines = metadata
+        .baselines
+        .as_ref()
+        .map(|described| exported_baselines::read(described, &tensors))
+        .transpose()?;
     Ok(Exported {
         index: Index {
             parameters: metadata.parameters,
             classes,
         },
         classes: metadata.classes,
+        reports: metadata.reports,
+        baselines,
     })
 }
 
@@ -213,6 +264,40 @@ mod tests {
                     shapes: 6,
                 })
                 .to_vec(),
+            reports: BTreeMap::from([(
+                "cat".to_owned(),
+                ModelReport {
+                    held_out: vec![0.1, 0.2],
+                    ..ModelReport::default()
+                },
+            )]),
+            baselines: Some(baselines()),
+        }
+    }
+
+    fn baselines() -> BaselineIndex {
+        let shape = |label: &str, eigenvalues: &[f64]| crate::baseline::BaselineShape {
+            label: label.to_owned(),
+            eigenvalues: eigenvalues.to_vec(),
+            distances: vec![0.25, 0.75],
+            words: vec![1.0, 0.0, 0.0],
+        };
+        let class = |label: &str, shapes| crate::baseline::BaselineClass {
+            label: label.to_owned(),
+            shapes,
+        };
+        BaselineIndex {
+            model: crate::baseline::BaselineModel {
+                distances: crate::baseline::SignatureDistances { largest: 2.5 },
+                vocabulary: crate::baseline::Vocabulary {
+                    words: Mat::from_fn(4, 3, |i, j| (i * 3 + j) as f64 / 7.0),
+                },
+                seed: 9,
+            },
+            classes: vec![
+                class("cat", vec![shape("a", &[1.0, 2.0]), shape("b", &[3.0])]),
+                class("great dane/old", Vec::new()),
+            ],
         }
     }
 
@@ -224,8 +309,44 @@ mod tests {
         let after = from_bytes(&bytes).unwrap();
         assert_eq!(after.classes, before.classes);
         assert_eq!(after.index.parameters, before.index.parameters);
-        let atoms = |e: &Exported, i: usize| e.index.classes[i].dictionaries[&Channel::Plain].atoms().clone();
+        let atoms = |e: &Exported, i: usize| {
+            e.index.classes[i].dictionaries[&Channel::Plain]
+                .atoms()
+                .into_owned()
+        };
         assert_eq!(atoms(&after, 1), atoms(&before, 1));
+        assert_eq!(after.reports, before.reports);
+        let (read, written) = (after.baselines.unwrap(), before.baselines.unwrap());
+        assert_eq!(read.classes, written.classes);
+        assert_eq!(read.model.vocabulary.words, written.model.vocabulary.words);
+        assert_eq!((read.model.distances.largest, read.model.seed), (2.5, 9));
+    }
+
+    #[test]
+    fn a_file_of_format_1_says_nothing_of_calibration_and_baselines() {
+        let bytes = to_bytes(&exported()).unwrap();
+        let (length, header) = SafeTensors::read_metadata(&bytes).unwrap();
+        let mut metadata: serde_json::Value =
+            serde_json::from_str(&header.metadata().as_ref().unwrap()[KEY]).unwrap();
+        for key in ["reports", "baselines"] {
+            metadata.as_object_mut().unwrap().remove(key);
+        }
+        metadata["format"] = 1.into();
+        let tensors = SafeTensors::deserialize(&bytes).unwrap();
+        let views = tensors.tensors();
+        let old = safetensors::serialize(
+            views,
+            Some(HashMap::from([(KEY.to_owned(), metadata.to_string())])),
+        );
+        let old = from_bytes(&old.unwrap()).unwrap();
+        assert!(length > 0 && old.baselines.is_none() && old.reports.is_empty());
+        assert_eq!(old.absent().len(), 3, "{:?}", old.absent());
+        metadata["format"] = 3.into();
+        let newer = safetensors::serialize(
+            tensors.tensors(),
+            Some(HashMap::from([(KEY.to_owned(), metadata.to_string())])),
+        );
+        assert!(from_bytes(&newer.unwrap()).unwrap_err().contains("format 3"));
     }
 
     #[test]

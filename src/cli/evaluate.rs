@@ -24,6 +24,8 @@ pub struct Report {
     pub classes: BTreeMap<String, usize>,
     /// Shapes in all.
     pub shapes: usize,
+    /// All shapes that were evaluated, in order: the positions in `retrieval.nearest` are positions in this list.
+    pub shape_list: Vec<ShapeName>,
     /// Files that could not be used.
     pub refused: Vec<Refused>,
     /// Classes left out because they have too few shapes.
@@ -40,6 +42,15 @@ pub struct Report {
     pub seconds: f64,
 }
 
+/// What a shape is called.
+#[derive(Debug, Serialize)]
+pub struct ShapeName {
+    /// Its class.
+    pub class: String,
+    /// Its name, unique within the class.
+    pub name: String,
+}
+
 /// The outcome of one protocol.
 #[derive(Debug, Serialize)]
 pub struct Outcome {
@@ -47,7 +58,7 @@ pub struct Outcome {
     pub name: &'static str,
     /// Share of queries answered with the right class, 0 to 1.
     pub top1: f64,
-    /// The evaluation, its queries cut to the worst.
+    /// The evaluation; as text its queries are cut to the worst, as JSON all are there.
     #[serde(flatten)]
     pub evaluation: Evaluation,
 }
@@ -77,6 +88,13 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
     let mut report = Report {
         classes,
         shapes: shapes.len(),
+        shape_list: shapes
+            .iter()
+            .map(|shape| ShapeName {
+                class: shape.class.clone(),
+                name: shape.name.clone(),
+            })
+            .collect(),
         refused,
         left_out,
         parameters,
@@ -92,6 +110,9 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
     if json {
         output::json(&report)?;
     } else {
+        for outcome in &mut report.protocols {
+            outcome.evaluation.queries.truncate(args.worst);
+        }
         output::line(&evaluation_report::text(&report))?;
     }
     if report.refused.is_empty() {
@@ -124,7 +145,7 @@ fn run_protocol(
         return Ok(());
     };
     let progress = Progress::new(protocol.name(), 0);
-    let mut evaluation = evaluate(
+    let evaluation = evaluate(
         shapes,
         protocol,
         &report.parameters,
@@ -134,7 +155,6 @@ fn run_protocol(
     )?;
     progress.finish();
     figures.evaluation(&evaluation)?;
-    evaluation.queries.truncate(args.worst);
     report.protocols.push(Outcome {
         name: protocol.name(),
         top1: evaluation.top1(),

@@ -5,6 +5,7 @@ use super::{CliError, data_dir, output};
 use crate::config::DEFAULT_DATA;
 use crate::store::{Store, StoreOptions};
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -32,14 +33,16 @@ pub fn run(args: &ExportArgs, as_json: bool) -> Result<(), CliError> {
         output::json(&json!({
             "file": args.out.display().to_string(),
             "classes": exported.classes,
+            "absent": exported.absent(),
             "bytes": bytes.len(),
         }))
     } else {
         output::line(&format!(
-            "{} classes, {} bytes in {}",
+            "{} classes, {} bytes in {}; not in the file: {}",
             exported.classes.len(),
             bytes.len(),
-            args.out.display()
+            args.out.display(),
+            exported.absent().join("; ")
         ))
     }
 }
@@ -53,7 +56,19 @@ fn from_store(data: &Path) -> Result<Exported, CliError> {
         .map_err(failed)?
         .ok_or_else(|| CliError::at(data, "nothing is indexed yet; run `shapelex index DIR` first"))?;
     let mut index = store.load_index(&generation).map_err(failed)?;
+    let mut baselines = store.load_baselines(&generation).map_err(failed)?;
+    let names: BTreeMap<String, String> = generation
+        .classes
+        .iter()
+        .map(|class| (class.class.to_string(), class.name.to_string()))
+        .collect();
+    for class in baselines.iter_mut().flat_map(|b| &mut b.classes) {
+        if let Some(name) = names.get(&class.label) {
+            class.label.clone_from(name);
+        }
+    }
     let mut classes = Vec::new();
+    let mut reports = BTreeMap::new();
     for (indexed, learnt) in index.classes.iter_mut().zip(&generation.classes) {
         // The index is labelled by identifiers, which mean nothing outside this data directory.
         indexed.label = learnt.name.to_string();
@@ -61,8 +76,14 @@ fn from_store(data: &Path) -> Result<Exported, CliError> {
             name: learnt.name.to_string(),
             shapes: learnt.shapes,
         });
+        reports.insert(learnt.name.to_string(), learnt.report.clone());
     }
-    Ok(Exported { index, classes })
+    Ok(Exported {
+        index,
+        classes,
+        reports,
+        baselines,
+    })
 }
 
 /// All of the file or nothing: written beside it, then renamed.

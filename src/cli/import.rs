@@ -2,9 +2,9 @@
 
 use super::dictionaries::{Exported, load};
 use super::{CliError, data_dir, output};
+use crate::baseline::BaselineIndex;
 use crate::config::DEFAULT_DATA;
-use crate::model::{ClassName, Generation, GenerationClass};
-use crate::pipeline::ModelReport;
+use crate::model::{ClassName, Generation, GenerationClass, Origin};
 use crate::store::{Store, StoreError, StoreOptions};
 use serde_json::json;
 use std::path::PathBuf;
@@ -22,6 +22,7 @@ pub struct ImportArgs {
 
 /// Makes the file's dictionaries the next generation of the index. It replaces the one before: classes the file does
 /// not name stay in the catalogue but are not indexed. Classes are matched by name and made where they are missing.
+/// Reindexes keep an imported class until it gets shapes of its own or is deleted.
 ///
 /// # Errors
 /// [`CliError::Failed`] where the file or the data directory cannot be used.
@@ -40,12 +41,17 @@ pub fn run(args: &ImportArgs, as_json: bool) -> Result<(), CliError> {
         data_dir::say_made(&args.data);
     }
     if as_json {
-        output::json(&json!({ "generation": number, "classes": exported.classes }))
+        output::json(&json!({
+            "generation": number,
+            "classes": exported.classes,
+            "absent": exported.absent(),
+        }))
     } else {
         output::line(&format!(
-            "{} classes are index generation {number} of {}",
+            "{} classes are index generation {number} of {}; not in the file: {}",
             exported.classes.len(),
-            args.data.display()
+            args.data.display(),
+            exported.absent().join("; ")
         ))
     }
 }
@@ -64,19 +70,25 @@ fn into_store(args: &ImportArgs, exported: &Exported, names: Vec<ClassName>) -> 
         classes.push(GenerationClass {
             class: class.id,
             name: class.name,
+            origin: Origin::Imported,
             // Counts as learnt from what the class has now, so that a reindex of stale classes keeps it.
             revision: class.revision,
             shapes: entry.shapes,
             dictionary: key,
             bytes,
             atoms: indexed.dictionaries.values().map(|d| d.len()).sum(),
-            report: ModelReport::default(),
+            report: exported.reports.get(&entry.name).cloned().unwrap_or_default(),
             shape_dictionaries: Vec::new(),
         });
     }
+    let baselines = exported
+        .baselines
+        .as_ref()
+        .map(|baselines| put_baselines(&store, &classes, baselines))
+        .transpose()?;
     classes.sort_by_key(|class| class.class);
     store.put_generation_and_switch(&Generation {
-        baselines: None,
+        baselines,
         number,
         parameters: exported.index.parameters.clone(),
         created_at: jiff::Timestamp::now(),
@@ -84,4 +96,21 @@ fn into_store(args: &ImportArgs, exported: &Exported, names: Vec<ClassName>) -> 
     })?;
     store.flush()?;
     Ok(number)
+}
+
+/// Keeps what the baselines need of the classes, none of a class the file has nothing of; returns the key of what they
+/// share.
+fn put_baselines(
+    store: &Store,
+    classes: &[GenerationClass],
+    baselines: &BaselineIndex,
+) -> Result<String, StoreError> {
+    let model = store.put_baseline_model(&baselines.model)?;
+    for class in classes {
+        let name = class.name.as_str();
+        let described = baselines.classes.iter().find(|c| c.label == name);
+        let shapes = described.map_or_else(Vec::new, |c| c.shapes.clone());
+        store.put_baseline_shapes(class, &model, shapes)?;
+    }
+    Ok(model)
 }

@@ -27,6 +27,7 @@ mod evaluate_figures;
 mod evaluation_report;
 mod events;
 pub mod export;
+mod exported_baselines;
 mod figures;
 mod files;
 mod folders;

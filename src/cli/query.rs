@@ -1,6 +1,7 @@
 //! `shapelex query`: which class a mesh belongs to.
 
 use super::client::{Client, TargetArgs};
+use super::dictionaries::Exported;
 use super::files::MeshFile;
 use super::progress::Progress;
 use super::query_inputs::{Input, gather};
@@ -10,11 +11,12 @@ use super::values::{at_least_one, one_of};
 use super::{CliError, api, dictionaries, output, query_text};
 use crate::cancel::Cancel;
 use crate::http::dto::parameters::QueryRankByName;
+use crate::http::dto::query::VerdictDto;
 use crate::mesh::{Limits, ReadContext, read_within};
 use crate::parameters::RankBy;
 use crate::pipeline::prepared::refined_to;
-use crate::pipeline::{describe_query, rank_top};
-use crate::ranking::Index;
+use crate::pipeline::{RankedClass, describe_query, judge, judged_by, rank_top};
+use crate::ranking::JUDGED;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -46,7 +48,7 @@ static RANK_BY: [QueryRankByName; 7] = QueryRankByName::ALL;
 
 enum Source {
     Service(Client),
-    File(Box<Index>, RankBy),
+    File(Box<Exported>, RankBy),
 }
 
 /// Ranks every mesh; goes on after one that is refused. With `--json` one line per mesh: the API's answer and the file's
@@ -119,9 +121,9 @@ fn source(args: &QueryArgs) -> Result<Source, CliError> {
     let Some(path) = &args.dictionaries else {
         return Ok(Source::Service(args.target.client()?));
     };
-    let index = dictionaries::load(path)?.index;
+    let exported = dictionaries::load(path)?;
     let rank_by = match args.rank_by.map(QueryRankByName::method) {
-        None => index.parameters.rank_by,
+        None => exported.index.parameters.rank_by,
         Some(Ok(rank_by)) => rank_by,
         Some(Err(_)) => {
             return Err(CliError::Usage(
@@ -130,7 +132,7 @@ fn source(args: &QueryArgs) -> Result<Source, CliError> {
             ));
         }
     };
-    Ok(Source::File(Box::new(index), rank_by))
+    Ok(Source::File(Box::new(exported), rank_by))
 }
 
 impl Source {
@@ -139,7 +141,7 @@ impl Source {
         let file = input.load(limits.max_bytes)?;
         let answer = match self {
             Self::Service(client) => api::query(client, file, Some(top), rank_by.map(QueryRankByName::name))?,
-            Self::File(index, rank_by) => rank_against(index, &file, top, *rank_by, &limits)?,
+            Self::File(exported, rank_by) => rank_against(exported, &file, top, *rank_by, &limits)?,
         };
         Ok(answer)
     }
@@ -148,24 +150,42 @@ impl Source {
 /// The same stages as the service's query, on an index that came out of a file. The answer has the members of the
 /// API's answer that have a meaning without a service.
 fn rank_against(
-    index: &Index,
+    exported: &Exported,
     file: &MeshFile,
     top: usize,
     rank_by: RankBy,
     limits: &Limits,
 ) -> Result<Value, CliError> {
+    let index = &exported.index;
     let cancel = Cancel::new();
     let context = ReadContext::new(*limits);
     let (format, soup) = read_within(&file.source(), &context)?;
     let mut description = describe_query(soup, &index.parameters, &cancel, &|_| ())?;
     description.report.warnings.splice(0..0, context.warnings.list());
-    let ranking = rank_top(&description.views, index, rank_by, top, &cancel)
+    // The verdict is about the first few, however many are shown.
+    let ranking = rank_top(&description.views, index, rank_by, top.max(JUDGED), &cancel)
         .map_err(crate::pipeline::PipelineError::from)?;
+    let calibration = exported.calibration();
+    let ranked: Vec<RankedClass<'_>> = ranking
+        .classes
+        .iter()
+        .map(|class| RankedClass {
+            label: &class.label,
+            name: &class.label,
+            score: class.score,
+        })
+        .collect();
+    let judged = judge(
+        judged_by(&calibration, &index.parameters, rank_by, &description),
+        &ranked,
+    );
     let classes: Vec<Value> = ranking
         .classes
         .iter()
+        .zip(&judged.p_values)
+        .take(top)
         .enumerate()
-        .map(|(i, c)| {
+        .map(|(i, (c, p_value))| {
             json!({
                 "rank": i + 1,
                 "class": { "name": c.label },
@@ -177,13 +197,18 @@ fn rank_against(
                 "mean_nonzeros": c.mean_nonzeros,
                 "hypothesis": c.hypothesis,
                 "margin": c.margin,
+                "p_value": p_value,
             })
         })
         .collect();
     Ok(json!({
         "name": file.name,
         "classes": classes,
+        "verdict": VerdictDto::from(judged.verdict.clone()),
+        "probability": judged.verdict.probability,
+        "none_of_these": judged.none_of_these,
         "margin": ranking.confidence,
+        "confidence": ranking.confidence,
         "compared": ranking.compared,
         "pruned": ranking.pruned,
         "signatures": ranking.signatures,

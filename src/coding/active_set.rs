@@ -412,7 +412,7 @@ impl ActiveSet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coding::Dictionary;
+    use crate::coding::prepared::Prepared;
     use faer::Mat;
 
     #[test]
@@ -420,7 +420,7 @@ mod tests {
         // d_3 = 0.6 (d_1 + d_2) reaches the signal (1, 1) at a lower ‖a‖₁ than the first two together.
         let identity = |i, j| if i == j { 1.0 } else { 0.0 };
         let atoms = Mat::from_fn(2, 3, |i, j| if j == 2 { 0.6 } else { identity(i, j) });
-        let dictionary = Dictionary::new(atoms).unwrap();
+        let dictionary = Prepared::new(atoms).unwrap();
         let mut rough = [Lanes::default()];
         rough[0][..3].copy_from_slice(&[1.0, 1.0, 1.2]);
         let problem = Problem {

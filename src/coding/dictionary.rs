@@ -1,155 +1,251 @@
-//! A dictionary: L atoms of M values, and what the Lasso needs of it over and over.
+//! A dictionary: L atoms of M values, whole for coding at once or at single precision for being kept.
+//!
+//! What the Lasso needs beside the atoms, two Gram matrices most of all, takes several times their memory. An index of
+//! thousands of classes keeps the atoms alone, which learning rounds to single precision, and prepares them where they are
+//! used: for good while there is room, and else for the call. The codes are the same to the last bit.
 
 use super::CodingError;
-use super::dot::dot;
-use super::screen::Screen;
-use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::{Accum, Mat, MatRef, Par};
-use std::sync::OnceLock;
+use super::prepared::{Prepared, prepared_bytes};
+use faer::Mat;
+use std::borrow::Cow;
+use std::ops::Deref;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
-/// Gram matrices of up to so many entries (1 MB) are kept; of larger ones, most of whose entries few codes touch, a
-/// product is computed when it is met.
-const KEPT: usize = 1 << 17;
+/// Up to so many signals are coded under atoms that are prepared for the call without their exact products.
+const FEW_SIGNALS: usize = 128;
 
-/// A learnt dictionary D with what the Lasso needs of it.
+/// A learnt dictionary D.
 #[derive(Clone, Debug)]
-pub struct Dictionary {
-    atoms: Mat<f64>,
-    /// ‖d_j‖² of each atom.
-    squares: Vec<f64>,
-    /// Computed at once for a dictionary of few atoms that codes many signals, and for others only where it is missed.
-    gram: OnceLock<Mat<f64>>,
-    screen: Screen,
+pub struct Dictionary(Form);
+
+#[derive(Clone, Debug)]
+enum Form {
+    Whole(Box<Prepared>),
+    Single(Single),
 }
 
-impl Dictionary {
-    /// Takes D (M × L, one atom per column, ‖d_j‖ ≤ 1 up to rounding, all finite) and computes DᵀD.
-    pub fn new(atoms: Mat<f64>) -> Result<Self, CodingError> {
-        let squares = squares(&atoms);
-        for &norm2 in &squares {
-            if !norm2.is_finite() {
-                return Err(CodingError::NotFinite { what: "dictionary" });
-            }
-            if norm2 > 1.0 + 1e-5 {
-                return Err(CodingError::BadParameter {
-                    name: "atom norm",
-                    expected: "at most 1",
-                    found: format!("{}", norm2.sqrt()),
-                });
-            }
-        }
-        let gram = gram(&atoms);
-        let screen = Screen::new(&atoms, &gram);
-        let kept = if gram.ncols() * gram.nrows() <= KEPT {
-            OnceLock::from(gram)
-        } else {
-            OnceLock::new()
-        };
-        Ok(Self {
-            atoms,
-            squares,
-            gram: kept,
-            screen,
+/// Atoms at single precision.
+#[derive(Debug)]
+struct Single {
+    /// Atom after atom.
+    values: Vec<f32>,
+    dimension: usize,
+    /// Filled at the first use that finds room.
+    prepared: OnceLock<Box<Prepared>>,
+    room: Arc<PreparedRoom>,
+}
+
+/// How much memory the prepared forms of many dictionaries may take together.
+#[derive(Debug)]
+pub struct PreparedRoom {
+    left: AtomicUsize,
+}
+
+impl PreparedRoom {
+    /// Room for this many bytes.
+    pub fn new(bytes: usize) -> Arc<Self> {
+        Arc::new(Self {
+            left: AtomicUsize::new(bytes),
         })
     }
 
-    /// As [`Dictionary::new`] for atoms known to be sound, and quicker: for coding a few hundred signals and no more.
-    pub(super) fn for_few_signals(atoms: Mat<f64>) -> Self {
-        let screen = Screen::direct(&atoms);
-        Self {
-            squares: squares(&atoms),
-            atoms,
-            gram: OnceLock::new(),
-            screen,
+    /// Takes some of the room; false where there is not enough.
+    fn take(&self, bytes: usize) -> bool {
+        let rest = |left: usize| left.checked_sub(bytes);
+        self.left
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, rest)
+            .is_ok()
+    }
+
+    fn give_back(&self, bytes: usize) {
+        self.left.fetch_add(bytes, Ordering::Relaxed);
+    }
+}
+
+/// A prepared form, kept or made for a call.
+pub(super) enum Loan<'a> {
+    Kept(&'a Prepared),
+    Made(Box<Prepared>),
+}
+
+impl Deref for Loan<'_> {
+    type Target = Prepared;
+
+    fn deref(&self) -> &Prepared {
+        match self {
+            Self::Kept(prepared) => prepared,
+            Self::Made(prepared) => prepared,
+        }
+    }
+}
+
+impl Dictionary {
+    /// Takes D (M × L, one atom per column, ‖d_j‖ ≤ 1 up to rounding, all finite) and prepares it for coding.
+    ///
+    /// # Errors
+    /// [`CodingError::NotFinite`]; [`CodingError::BadParameter`] for an atom that is too long.
+    pub fn new(atoms: Mat<f64>) -> Result<Self, CodingError> {
+        Ok(Prepared::new(atoms)?.into())
+    }
+
+    /// Takes D at single precision, atom after atom of `dimension` values, to be kept as it is and prepared where it is
+    /// used: for good while there is `room`. Codes are those of [`Dictionary::new`] to the last bit, but for up to 128
+    /// signals at once, whose codes may differ by rounding.
+    ///
+    /// # Errors
+    /// As [`Dictionary::new`]; [`CodingError::DimensionMismatch`] where the last atom is cut short.
+    pub fn single(values: Vec<f32>, dimension: usize, room: &Arc<PreparedRoom>) -> Result<Self, CodingError> {
+        let rest = values.len() % dimension.max(1);
+        if dimension == 0 || rest != 0 {
+            return Err(CodingError::DimensionMismatch {
+                signature: dimension,
+                atoms: rest,
+            });
+        }
+        for atom in values.chunks_exact(dimension) {
+            Prepared::check(atom.iter().map(|d| f64::from(*d) * f64::from(*d)).sum())?;
+        }
+        Ok(Self(Form::Single(Single {
+            values,
+            dimension,
+            prepared: OnceLock::new(),
+            room: Arc::clone(room),
+        })))
+    }
+
+    /// The form that codes are computed by, for so many signals.
+    pub(super) fn prepared(&self, signals: usize) -> Loan<'_> {
+        match &self.0 {
+            Form::Whole(prepared) => Loan::Kept(prepared),
+            Form::Single(single) => single.prepared(signals),
         }
     }
 
-    /// The atoms, to be changed; [`Dictionary::renew`] must follow before anything is coded.
-    pub(super) fn atoms_mut(&mut self) -> &mut Mat<f64> {
-        &mut self.atoms
-    }
-
-    /// Does with changed atoms what [`Dictionary::for_few_signals`] does, in the memory there is.
-    pub(super) fn renew(&mut self) {
-        self.squares = squares(&self.atoms);
-        self.gram.take();
-        self.screen.renew(&self.atoms);
-    }
-
-    /// D, given up.
-    pub(super) fn into_atoms(self) -> Mat<f64> {
-        self.atoms
-    }
-
     /// D, M × L, one atom per column.
-    pub fn atoms(&self) -> &Mat<f64> {
-        &self.atoms
+    pub fn atoms(&self) -> Cow<'_, Mat<f64>> {
+        match &self.0 {
+            Form::Whole(prepared) => Cow::Borrowed(prepared.atoms()),
+            Form::Single(single) => match single.prepared.get() {
+                Some(prepared) => Cow::Borrowed(prepared.atoms()),
+                None => Cow::Owned(single.atoms()),
+            },
+        }
     }
 
-    /// DᵀD, L × L, symmetric.
-    pub fn gram(&self) -> &Mat<f64> {
-        self.gram.get_or_init(|| gram(&self.atoms))
-    }
-
-    /// DᵀD where it has been computed and is small. Whether a large one has been depends on what was coded before, and
-    /// codes must not, to the last bit.
-    pub(super) fn known_gram(&self) -> Option<MatRef<'_, f64>> {
-        let small = |gram: &&Mat<f64>| gram.ncols() * gram.nrows() <= KEPT;
-        self.gram.get().filter(small).map(|gram| gram.as_ref())
-    }
-
-    /// ‖d_j‖² of each atom.
-    pub(super) fn squares(&self) -> &[f64] {
-        &self.squares
-    }
-
-    pub(super) fn screen(&self) -> &Screen {
-        &self.screen
+    /// r ← r − a d_j for every atom j and value a of a code.
+    pub fn subtract(&self, atoms: &[u32], values: &[f64], residual: &mut [f64]) {
+        for (&j, &a) in atoms.iter().zip(values) {
+            match &self.0 {
+                Form::Whole(prepared) => {
+                    let atom = prepared.atoms().col_as_slice(j as usize);
+                    residual.iter_mut().zip(atom).for_each(|(r, d)| *r -= a * d);
+                }
+                Form::Single(single) => {
+                    let atom = &single.values[j as usize * single.dimension..][..single.dimension];
+                    let atom = atom.iter().map(|d| f64::from(*d));
+                    residual.iter_mut().zip(atom).for_each(|(r, d)| *r -= a * d);
+                }
+            }
+        }
     }
 
     /// M, the length of an atom.
     pub fn dimension(&self) -> usize {
-        self.atoms.nrows()
+        match &self.0 {
+            Form::Whole(prepared) => prepared.dimension(),
+            Form::Single(single) => single.dimension,
+        }
     }
 
     /// L, the number of atoms.
     pub fn len(&self) -> usize {
-        self.atoms.ncols()
+        match &self.0 {
+            Form::Whole(prepared) => prepared.len(),
+            Form::Single(single) => single.values.len() / single.dimension,
+        }
     }
 
     /// Whether there are no atoms.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-}
 
-fn squares(atoms: &Mat<f64>) -> Vec<f64> {
-    (0..atoms.ncols())
-        .map(|j| dot(atoms.col_as_slice(j), atoms.col_as_slice(j)))
-        .collect()
-}
-
-/// DᵀD: half of it is computed, the other mirrored.
-fn gram(atoms: &Mat<f64>) -> Mat<f64> {
-    use BlockStructure::{Rectangular, TriangularLower};
-    let l = atoms.ncols();
-    let mut gram = Mat::zeros(l, l);
-    let (left, right) = (atoms.transpose(), atoms.as_ref());
-    matmul(
-        gram.as_mut(),
-        TriangularLower,
-        Accum::Replace,
-        left,
-        Rectangular,
-        right,
-        Rectangular,
-        1.0,
-        Par::Seq,
-    );
-    for j in 0..l {
-        for i in j + 1..l {
-            gram[(j, i)] = gram[(i, j)];
+    /// Memory it takes now, in bytes, its prepared form included where that is kept.
+    pub fn resident_bytes(&self) -> usize {
+        match &self.0 {
+            Form::Whole(prepared) => prepared.bytes(),
+            Form::Single(single) => {
+                size_of::<f32>() * single.values.capacity()
+                    + single.prepared.get().map_or(0, |prepared| prepared.bytes())
+            }
         }
     }
-    gram
+}
+
+impl From<Prepared> for Dictionary {
+    fn from(prepared: Prepared) -> Self {
+        Self(Form::Whole(Box::new(prepared)))
+    }
+}
+
+impl Clone for Single {
+    /// The copy finds room of its own for its prepared form.
+    fn clone(&self) -> Self {
+        Self {
+            values: self.values.clone(),
+            dimension: self.dimension,
+            prepared: OnceLock::new(),
+            room: Arc::clone(&self.room),
+        }
+    }
+}
+
+impl Single {
+    fn count(&self) -> usize {
+        self.values.len() / self.dimension
+    }
+
+    fn atoms(&self) -> Mat<f64> {
+        let mut atoms = Mat::zeros(self.dimension, self.count());
+        for (j, atom) in self.values.chunks_exact(self.dimension).enumerate() {
+            for (to, from) in atoms.col_as_slice_mut(j).iter_mut().zip(atom) {
+                *to = f64::from(*from);
+            }
+        }
+        atoms
+    }
+
+    fn prepared(&self, signals: usize) -> Loan<'_> {
+        if let Some(prepared) = self.prepared.get() {
+            return Loan::Kept(prepared);
+        }
+        let bytes = prepared_bytes(self.dimension, self.count());
+        if self.room.take(bytes) {
+            let mut fresh = false;
+            let kept = self.prepared.get_or_init(|| {
+                fresh = true;
+                Box::new(Prepared::of_sound(self.atoms()))
+            });
+            // Another thread was first.
+            if !fresh {
+                self.room.give_back(bytes);
+            }
+            return Loan::Kept(kept);
+        }
+        let atoms = self.atoms();
+        Loan::Made(Box::new(if signals <= FEW_SIGNALS {
+            Prepared::for_few_signals(atoms)
+        } else {
+            Prepared::of_sound(atoms)
+        }))
+    }
+}
+
+impl Drop for Single {
+    fn drop(&mut self) {
+        if let Some(prepared) = self.prepared.get() {
+            self.room.give_back(prepared.bytes());
+        }
+    }
 }

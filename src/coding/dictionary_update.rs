@@ -1,11 +1,12 @@
 //! The dictionary half of online learning: running sums, block-coordinate descent on the atoms, and what replaces
 //! atoms of no use (Mairal et al. 2010, Algorithm 2 and Section 3.4).
 
+use super::Codes;
 use super::dispatch::{Kernel, fastest};
 use super::dot::dot;
 use super::initialise::jittered;
 use super::lasso::column;
-use super::{Codes, Dictionary};
+use super::prepared::Prepared;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rand_chacha::ChaCha8Rng;
@@ -51,7 +52,7 @@ pub(super) struct DictionaryUpdate {
     dimension: usize,
     batch: usize,
     /// D, M × L. What it holds beside the atoms is that of the atoms last handed out.
-    dictionary: Dictionary,
+    dictionary: Prepared,
     /// A = Σ aaᵀ, L × L, faded.
     code_sums: Vec<f64>,
     /// B = Σ saᵀ, M × L, faded.
@@ -68,7 +69,7 @@ pub(super) struct DictionaryUpdate {
 
 impl DictionaryUpdate {
     /// From initial atoms.
-    pub fn new(dictionary: Dictionary, batch: usize) -> Self {
+    pub fn new(dictionary: Prepared, batch: usize) -> Self {
         let (dimension, count) = (dictionary.dimension(), dictionary.len());
         Self {
             dimension,
@@ -96,7 +97,7 @@ impl DictionaryUpdate {
     }
 
     /// D as it stands, ready to code.
-    pub fn dictionary(&mut self) -> &Dictionary {
+    pub fn dictionary(&mut self) -> &Prepared {
         if self.moved {
             self.dictionary.renew();
             self.moved = false;

@@ -106,15 +106,16 @@ mod tests {
     use super::*;
     use crate::cancel::Cancel;
     use crate::coding::encode;
+    use crate::coding::prepared::Prepared;
     use crate::coding::scan::Rows;
     use faer::Mat;
 
     #[test]
     fn coordinate_descent_ends_where_the_active_set_does() {
         let wave = |i: usize, j: usize| ((i * (j + 2)) as f64 * 0.37).sin() / 5.0;
-        let dictionary = Dictionary::new(Mat::from_fn(20, 12, wave)).unwrap();
+        let dictionary = Prepared::new(Mat::from_fn(20, 12, wave)).unwrap();
         let signals = Mat::from_fn(20, 1, |i, _| (i as f64 * 0.9).cos() + 0.3);
-        let codes = encode(&dictionary, signals.as_ref(), 0.05, &Cancel::new()).unwrap();
+        let codes = encode(&dictionary.clone().into(), signals.as_ref(), 0.05, &Cancel::new()).unwrap();
         let problem = Problem {
             atoms: dictionary.atoms().as_ref(),
             squares: dictionary.squares(),

@@ -1,5 +1,6 @@
 //! The Lasso of every signal against one dictionary (method, step 6; Eq. 1).
 
+use super::prepared::Prepared;
 use super::workspace::with_kept;
 use super::{CodingError, Dictionary, Signals};
 use crate::cancel::Cancel;
@@ -58,7 +59,17 @@ pub fn encode_signals(
     lambda: f64,
     cancel: &Cancel,
 ) -> Result<Codes, CodingError> {
-    check(dictionary, signals, lambda)?;
+    check(dictionary.dimension(), signals, lambda)?;
+    encode_prepared(&dictionary.prepared(signals.len()), signals, lambda, cancel)
+}
+
+/// As [`encode_signals`], under atoms that are prepared already.
+pub(super) fn encode_prepared(
+    dictionary: &Prepared,
+    signals: &Signals<'_>,
+    lambda: f64,
+    cancel: &Cancel,
+) -> Result<Codes, CodingError> {
     with_kept(|workspace| {
         workspace.run(dictionary, signals, lambda, cancel)?;
         Ok(workspace.codes())
@@ -72,19 +83,29 @@ pub fn score_signals(
     lambda: f64,
     cancel: &Cancel,
 ) -> Result<Vec<CodeScore>, CodingError> {
-    check(dictionary, signals, lambda)?;
+    check(dictionary.dimension(), signals, lambda)?;
+    score_prepared(&dictionary.prepared(signals.len()), signals, lambda, cancel)
+}
+
+/// As [`score_signals`], under atoms that are prepared already.
+pub(super) fn score_prepared(
+    dictionary: &Prepared,
+    signals: &Signals<'_>,
+    lambda: f64,
+    cancel: &Cancel,
+) -> Result<Vec<CodeScore>, CodingError> {
     with_kept(|workspace| {
         workspace.run(dictionary, signals, lambda, cancel)?;
         Ok(workspace.scores())
     })
 }
 
-fn check(dictionary: &Dictionary, signals: &Signals<'_>, lambda: f64) -> Result<(), CodingError> {
+fn check(dimension: usize, signals: &Signals<'_>, lambda: f64) -> Result<(), CodingError> {
     check_lambda(lambda)?;
-    if signals.dimension() != dictionary.dimension() {
+    if signals.dimension() != dimension {
         return Err(CodingError::DimensionMismatch {
             signature: signals.dimension(),
-            atoms: dictionary.dimension(),
+            atoms: dimension,
         });
     }
     Ok(())

@@ -3,8 +3,9 @@
 use super::columns::Columns;
 use super::dictionary_update::DictionaryUpdate;
 use super::initialise::{distinct, initial_atoms};
-use super::lasso::check_lambda;
-use super::{CodingError, Dictionary, Signals, encode, score_signals};
+use super::lasso::{check_lambda, encode_prepared, score_prepared};
+use super::prepared::Prepared;
+use super::{CodingError, Dictionary, Signals};
 use crate::cancel::Cancel;
 use faer::{Mat, MatRef};
 use rand::SeedableRng;
@@ -135,13 +136,13 @@ fn learn_columns(
         signals.dimension(),
         MEASURED.max(parameters.batch).min(order.len()),
     );
-    let mean_objective = |dictionary: &Dictionary, memory: &mut Mat<f64>| -> Result<f64, CodingError> {
+    let mean_objective = |dictionary: &Prepared, memory: &mut Mat<f64>| -> Result<f64, CodingError> {
         signals.gather(&measured, memory);
         let measured = Signals::new(memory.as_ref())?;
-        let scores = score_signals(dictionary, &measured, parameters.lambda, cancel)?;
+        let scores = score_prepared(dictionary, &measured, parameters.lambda, cancel)?;
         Ok(scores.iter().map(|score| score.objective).sum::<f64>() / scores.len() as f64)
     };
-    let mut dictionary = Dictionary::for_few_signals(rounded(initial.clone()));
+    let mut dictionary = Prepared::for_few_signals(rounded(initial.clone()));
     let initial_objective = mean_objective(&dictionary, &mut memory)?;
     *dictionary.atoms_mut() = initial;
     dictionary.renew();
@@ -161,17 +162,18 @@ fn learn_columns(
             next += 1;
         }
         signals.gather(&drawn, &mut memory);
-        let codes = encode(update.dictionary(), memory.as_ref(), parameters.lambda, cancel)?;
+        let drawn = Signals::new(memory.as_ref())?;
+        let codes = encode_prepared(update.dictionary(), &drawn, parameters.lambda, cancel)?;
         update.step(memory.as_ref(), &codes, &mut random);
         progress(iteration + 1, parameters.iterations);
     }
 
     let replaced = update.replaced();
-    let mut dictionary = Dictionary::new(rounded(update.into_atoms()))?;
+    let mut dictionary = Prepared::new(rounded(update.into_atoms()))?;
     let mut objective = mean_objective(&dictionary, &mut memory)?;
     if objective > initial_objective {
         let initial = initial_atoms(signals, &distinct, count, &mut drawing);
-        (dictionary, objective) = (Dictionary::new(rounded(initial))?, initial_objective);
+        (dictionary, objective) = (Prepared::new(rounded(initial))?, initial_objective);
     }
     let report = LearnReport {
         signals: signals.len(),
@@ -182,7 +184,7 @@ fn learn_columns(
         initial_objective,
         objective,
     };
-    Ok((dictionary, report))
+    Ok((dictionary.into(), report))
 }
 
 /// The atoms at `f32` precision.

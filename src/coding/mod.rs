@@ -13,6 +13,7 @@ pub mod kkt;
 pub mod lasso;
 pub mod learn;
 mod path;
+mod prepared;
 mod scan;
 mod screen;
 pub mod signals;
@@ -22,7 +23,7 @@ mod wide;
 mod wide_factor;
 mod workspace;
 
-pub use dictionary::Dictionary;
+pub use dictionary::{Dictionary, PreparedRoom};
 pub use error::CodingError;
 pub use kkt::kkt_violation;
 pub use lasso::{CodeScore, Codes, encode, encode_signals, score_signals};

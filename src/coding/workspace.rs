@@ -5,9 +5,10 @@ use super::dispatch::{Kernel, fastest};
 use super::dot::dot;
 use super::kkt::coordinate_descent;
 use super::lasso::column;
+use super::prepared::Prepared;
 use super::scan::pieces;
 use super::screen::ScreenMemory;
-use super::{CodeScore, Codes, CodingError, Dictionary, Signals};
+use super::{CodeScore, Codes, CodingError, Signals};
 use crate::cancel::Cancel;
 use std::cell::RefCell;
 use std::ops::Range;
@@ -63,7 +64,7 @@ pub(super) fn with_kept<T>(work: impl FnOnce(&mut Workspace) -> T) -> T {
 
 struct CodeBlock<'a> {
     workspace: &'a mut Workspace,
-    dictionary: &'a Dictionary,
+    dictionary: &'a Prepared,
     signals: &'a Signals<'a>,
     block: Range<usize>,
     lambda: f64,
@@ -91,7 +92,7 @@ impl Workspace {
     /// Codes all signals.
     pub fn run(
         &mut self,
-        dictionary: &Dictionary,
+        dictionary: &Prepared,
         signals: &Signals<'_>,
         lambda: f64,
         cancel: &Cancel,
@@ -150,7 +151,7 @@ impl Workspace {
     #[inline(always)]
     fn code_block(
         &mut self,
-        dictionary: &Dictionary,
+        dictionary: &Prepared,
         signals: &Signals<'_>,
         block: Range<usize>,
         lambda: f64,
@@ -290,7 +291,7 @@ impl Workspace {
     fn fall_back(
         &mut self,
         problem: &Problem<'_>,
-        dictionary: &Dictionary,
+        dictionary: &Prepared,
         number: usize,
     ) -> Result<(), CodingError> {
         let count = dictionary.len();

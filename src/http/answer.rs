@@ -2,25 +2,26 @@
 
 use super::admission::Work;
 use super::dto::class::ClassRef;
-use super::dto::query::{QueryAnswer, QueryOptions, RankedClass, RankedShape};
+use super::dto::query::{DetailsName, QueryAnswer, QueryOptions, RankedClass, RankedShape, SampledView};
 use super::metrics;
 use super::problem::{Code, Problem};
-use super::problem_from::{baselines_missing, index_empty};
+use super::problem_from::{baselines_missing, baselines_not_imported, index_empty};
 use super::ranked::Ranked;
 use super::state::Parts;
 use super::time_limit::{TimeView, rank_until};
 use super::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
 use crate::mesh::{ReadContext, TriangleSoup};
-use crate::model::ClassId;
-use crate::parameters::Parameters;
-use crate::pipeline::prepared::OPEN_ABOVE;
-use crate::pipeline::{Stage, StageSpan, describe_plain, describe_query, rank, rank_top};
-use crate::ranking::{Index, SIGNIFICANCE};
+use crate::model::{ClassId, Generation, Origin};
+use crate::parameters::{Channel, Parameters};
+use crate::pipeline::{
+    Description, Stage, StageSpan, describe_plain, describe_query, judged_by, rank, rank_top,
+};
+use crate::ranking::{Index, JUDGED, NotJudged, SIGNIFICANCE};
 use crate::spectral;
 use crate::store::StoreError;
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
 /// Answers a query. Blocks on the computation: call it on the compute pool.
@@ -63,7 +64,8 @@ pub fn answer(
         _ => problem,
     };
     let named = options.rank_by.unwrap_or(parameters.rank_by.into());
-    let (description, ranking, left) = match named.method() {
+    let name_of = |label: &str| names.get(label).cloned().unwrap_or_else(|| label.to_owned());
+    let (description, ranking, left, verdict) = match named.method() {
         Ok(rank_by) => {
             let description =
                 describe_query(soup, parameters, stop, &observer).map_err(|e| timely(e.into()))?;
@@ -71,31 +73,37 @@ pub fn answer(
             let ranked = match limit {
                 Some(_) => rank_until(&description.views, &index, rank_by, stop),
                 None => match options.top {
-                    Some(top) => rank_top(&description.views, &index, rank_by, top, stop),
+                    // The verdict is about the first few, however many are answered.
+                    Some(top) => rank_top(&description.views, &index, rank_by, top.max(JUDGED), stop),
                     None => rank(&description.views, &index, rank_by, stop),
                 }
                 .map(|ranking| (ranking, Vec::new())),
             };
             let (ranking, left) = ranked.map_err(|e| timely(e.into()))?;
             let mut ranked = Ranked::from(ranking);
-            if rank_by == parameters.rank_by && description.report.openness <= OPEN_ABOVE {
-                ranked.judge(live.calibration.as_ref());
-            }
-            (description, ranked, left)
+            let calibration = match left.is_empty() {
+                true => judged_by(&live.calibration, parameters, rank_by, &description),
+                false => Err(NotJudged::Partial),
+            };
+            let verdict = ranked.judge(calibration, name_of);
+            (description, ranked, left, verdict)
         }
         Err(baseline) => {
             let baselines = live
                 .baselines
                 .as_ref()
-                .ok_or_else(|| baselines_missing(named.name()))?;
+                .ok_or_else(|| no_baselines(generation, named.name()))?;
             let description =
                 describe_plain(soup, parameters, stop, &observer).map_err(|e| timely(e.into()))?;
             observer(Stage::Ranking);
             let present = |label: &str| names.contains_key(label);
             let nearest = baselines
                 .nearest(&description, baseline, &present)
-                .ok_or_else(|| baselines_missing(named.name()))?;
-            (description, Ranked::from(nearest), Vec::new())
+                .ok_or_else(|| no_baselines(generation, named.name()))?;
+            let mut ranked = Ranked::from(nearest);
+            let left = without(&index, &ranked);
+            let verdict = ranked.judge(Err(NotJudged::OtherMeasure), name_of);
+            (description, ranked, left, verdict)
         }
     };
     drop(reserved);
@@ -105,7 +113,7 @@ pub fn answer(
     }
     let class_of = |label: &str| ClassRef {
         id: label.to_owned(),
-        name: names.get(label).cloned().unwrap_or_else(|| label.to_owned()),
+        name: name_of(label),
     };
     let top = options.top.unwrap_or(usize::MAX);
     let possible = ranking
@@ -145,14 +153,18 @@ pub fn answer(
         name: mesh.name.clone(),
         classes: classes.collect(),
         nearest_shapes: shapes.collect(),
-        confidence: ranking.confidence,
+        probability: verdict.probability,
+        verdict: verdict.into(),
+        margin: ranking.margin,
+        confidence: ranking.margin,
         compared: ranking.compared,
         pruned: ranking.pruned,
         none_of_these: ranking.none_of_these,
         possible_classes,
-        partial: !left.is_empty(),
+        partial: named.method().is_ok() && !left.is_empty(),
         not_compared: left.iter().map(|label| class_of(label)).collect(),
         signatures: ranking.signatures,
+        samples: (options.details == Some(DetailsName::Samples)).then(|| samples(&description)),
         format: format.extension().to_owned(),
         warnings: [context.warnings.list(), description.report.warnings.clone()].concat(),
         mesh: description.report.into(),
@@ -162,6 +174,43 @@ pub fn answer(
         parameters: parameters.clone().into(),
         timings_ms: timings(&stages, work.waited, began.elapsed()),
     })
+}
+
+fn no_baselines(generation: &Generation, rank_by: &str) -> Problem {
+    if generation
+        .classes
+        .iter()
+        .all(|class| class.origin == Origin::Imported)
+    {
+        baselines_not_imported(rank_by)
+    } else {
+        baselines_missing(rank_by)
+    }
+}
+
+/// Labels of the classes that a baseline knows no shape of: imported ones, where the file had nothing for it.
+fn without(index: &Index, ranked: &Ranked) -> Vec<String> {
+    let known: BTreeSet<&str> = ranked.classes.iter().map(|class| class.label.as_str()).collect();
+    let labels = index.classes.iter().map(|class| &class.label);
+    labels.filter(|l| !known.contains(l.as_str())).cloned().collect()
+}
+
+fn samples(description: &Description) -> Vec<SampledView> {
+    let views = description.views.iter().map(|view| SampledView {
+        hypothesis: view.hypothesis.into(),
+        channel: match view.channel {
+            Channel::Plain => "plain",
+            Channel::Whitened => "whitened",
+            Channel::FixedGrid => "fixed_grid",
+        },
+        area_scale: view.area_scale,
+        bounded: view.bounded,
+        vertices: view.signatures.vertices.clone(),
+        signals: (0..view.signatures.len())
+            .map(|i| view.signatures.matrix.col_as_slice(i).to_vec())
+            .collect(),
+    });
+    views.collect()
 }
 
 /// Memory the spectrum takes, in bytes, by the size the mesh is simplified to.

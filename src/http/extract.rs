@@ -123,15 +123,28 @@ fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
             "expected an object, found a list",
         ));
     }
-    serde_json::from_slice(body).map_err(|error| {
-        let code = match error.classify() {
-            serde_json::error::Category::Data => Code::InvalidField,
-            _ => Code::InvalidJson,
-        };
-        Problem::new(code, error.to_string())
-            .with("line", error.line())
-            .with("column", error.column())
-    })
+    let mut deserializer = serde_json::Deserializer::from_slice(body);
+    let parsed = serde_path_to_error::deserialize(&mut deserializer);
+    parsed
+        .map_err(|error| {
+            let path = error.path().to_string();
+            (error.into_inner(), path)
+        })
+        .and_then(|value| {
+            let rest = deserializer.end();
+            rest.map(|()| value).map_err(|error| (error, ".".to_owned()))
+        })
+        .map_err(|(error, path)| {
+            let position = (error.line(), error.column());
+            // A field of the wrong type reads as bad syntax where another was expected.
+            let valid = serde_json::from_slice::<serde::de::IgnoredAny>(body).is_ok();
+            let problem = match path.as_str() {
+                _ if !valid => Problem::new(Code::InvalidJson, error.to_string()),
+                "." => Problem::new(Code::InvalidField, error.to_string()),
+                path => Problem::new(Code::InvalidField, format!("{path}: {error}")).with("name", path),
+            };
+            problem.with("line", position.0).with("column", position.1)
+        })
 }
 
 /// For fields that are objects: refuses the lists serde would read as their fields in order.
@@ -142,6 +155,8 @@ where
 {
     use serde::Deserialize;
     let map = Option::<serde_json::Map<String, serde_json::Value>>::deserialize(deserializer)?;
-    map.map(|map| serde_json::from_value(serde_json::Value::Object(map)).map_err(serde::de::Error::custom))
-        .transpose()
+    map.map(|map| {
+        serde_path_to_error::deserialize(serde_json::Value::Object(map)).map_err(serde::de::Error::custom)
+    })
+    .transpose()
 }

@@ -174,6 +174,18 @@ pub fn baselines_missing(rank_by: &str) -> Problem {
     .with("next", "/v1/reindex")
 }
 
+/// All classes are imported, and their file had nothing for a baseline.
+pub fn baselines_not_imported(rank_by: &str) -> Problem {
+    Problem::new(
+        Code::BaselinesMissing,
+        format!(
+            "the index was imported from a file without what {rank_by} needs, and a reindex cannot make it; export it again \
+             with a newer shapelex, add shapes, or rank by objective"
+        ),
+    )
+    .with("rank_by", rank_by)
+}
+
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
         let detail = error.to_string();

@@ -1,7 +1,8 @@
 //! A ranking by whatever method, as the answer needs it.
 
 use crate::baseline::{Nearest, nearest_classes};
-use crate::ranking::{Calibration, ClassScore, Ranking};
+use crate::pipeline::{RankedClass, judge};
+use crate::ranking::{Calibration, ClassScore, NotJudged, Ranking, Verdict};
 
 /// A class and its score.
 pub(super) struct Class {
@@ -26,7 +27,7 @@ pub(super) struct Ranked {
     pub(super) classes: Vec<Class>,
     pub(super) shapes: Vec<Shape>,
     /// Relative margin of the best class to the runner-up; 1 where there is only one.
-    pub(super) confidence: f64,
+    pub(super) margin: f64,
     /// Signatures that were coded.
     pub(super) signatures: usize,
     /// Classes that were compared with, and how many of them a bound ruled out.
@@ -37,16 +38,29 @@ pub(super) struct Ranked {
 }
 
 impl Ranked {
-    /// Adds p-values and the verdict, where there is something to tell them by.
-    pub(super) fn judge(&mut self, calibration: Option<&Calibration>) {
-        let Some(calibration) = calibration else {
-            return;
-        };
-        let verdict = calibration.judge(self.classes.iter().map(|c| (c.label.as_str(), c.score)));
-        for (class, p_value) in self.classes.iter_mut().zip(verdict.p_values) {
+    /// Adds p-values, where there is something to tell them by, and makes the sentence; `name` is what a label is called.
+    pub(super) fn judge(
+        &mut self,
+        calibration: Result<&Calibration, NotJudged>,
+        name: impl Fn(&str) -> String,
+    ) -> Verdict {
+        let names: Vec<String> = self.classes.iter().map(|class| name(&class.label)).collect();
+        let ranked: Vec<RankedClass<'_>> = self
+            .classes
+            .iter()
+            .zip(&names)
+            .map(|(class, name)| RankedClass {
+                label: &class.label,
+                name,
+                score: class.score,
+            })
+            .collect();
+        let judged = judge(calibration, &ranked);
+        for (class, p_value) in self.classes.iter_mut().zip(judged.p_values) {
             class.p_value = p_value;
         }
-        self.none_of_these = Some(verdict.none_of_these);
+        self.none_of_these = judged.none_of_these;
+        judged.verdict
     }
 }
 
@@ -71,7 +85,7 @@ impl From<Ranking> for Ranked {
                     frobenius_error: Some(s.frobenius_error),
                 })
                 .collect(),
-            confidence: ranking.confidence,
+            margin: ranking.confidence,
             signatures: ranking.signatures,
             compared: ranking.compared,
             pruned: ranking.pruned,
@@ -99,7 +113,7 @@ impl From<Vec<Nearest>> for Ranked {
             coded: None,
         });
         Self {
-            confidence: margin(0).unwrap_or(1.0),
+            margin: margin(0).unwrap_or(1.0),
             compared: nearest.len(),
             pruned: 0,
             none_of_these: None,

@@ -4,8 +4,8 @@ use super::describe::Describer;
 use super::failure::ReindexError;
 use super::reindex::{Reindex, stop_if_cancelled};
 use crate::baseline::{BaselineModel, thinned};
-use crate::model::{Generation, GenerationClass, Shape};
-use crate::store::StoreError;
+use crate::model::{Generation, GenerationClass, Origin, Shape};
+use crate::store::{Store, StoreError};
 use rayon::prelude::*;
 
 /// Shapes at most that take part in finding what all share, evenly spread over the classes.
@@ -15,7 +15,8 @@ const LEARNT_FROM: usize = 128;
 /// they share, `None` where no shape can be described.
 ///
 /// The model of the generation before is kept while at least half of the classes are, so that a reindex of one class
-/// touches one class; where more have changed it is learnt anew, and all classes are described by it.
+/// touches one class, and while an imported class is described by it, as that cannot be described anew. Otherwise it is
+/// learnt anew, and all classes are described by it. An imported class that is not described has no shapes then.
 pub(super) fn learn_baselines(
     request: &Reindex<'_>,
     describer: &Describer<'_>,
@@ -36,7 +37,7 @@ pub(super) fn learn_baselines(
     request.progress.begin("learn baselines", classes.len());
     let before = current
         .and_then(|g| g.baselines.as_ref())
-        .filter(|_| 2 * kept >= classes.len());
+        .filter(|key| 2 * kept >= classes.len() || has_imported(store, classes, key));
     let known = match before {
         // One that cannot be read is learnt anew.
         Some(key) => store
@@ -76,6 +77,14 @@ pub(super) fn learn_baselines(
         Ok::<(), ReindexError>(())
     })?;
     Ok(Some(key))
+}
+
+/// Whether an imported class is described by the model of this key.
+fn has_imported(store: &Store, classes: &[GenerationClass], key: &str) -> bool {
+    classes
+        .iter()
+        .filter(|class| class.origin == Origin::Imported)
+        .any(|class| matches!(store.baseline_shapes(class, key), Ok(Some(shapes)) if !shapes.is_empty()))
 }
 
 /// Range and words of shapes evenly spread over the given ones.

@@ -1,8 +1,9 @@
 //! The index in memory.
 
+use super::trim;
 use crate::baseline::BaselineIndex;
 use crate::model::Generation;
-use crate::ranking::{Calibration, Index};
+use crate::ranking::{Calibration, Index, IndexedClass, NotJudged};
 use crate::store::{Store, StoreError};
 
 /// The index queries run against. A query holds the one it began with, whatever is switched in meanwhile.
@@ -15,18 +16,23 @@ pub struct LiveIndex {
     pub index: Index,
     /// What the baselines need, with the same labels; `None` where it was learnt without.
     pub baselines: Option<BaselineIndex>,
-    /// What scores shapes of its classes have, with the same labels; `None` where too few were learnt from.
-    pub calibration: Option<Calibration>,
+    /// What scores shapes of its classes have, with the same labels, or why that is not known.
+    pub calibration: Result<Calibration, NotJudged>,
+}
+
+impl LiveIndex {
+    /// Memory its dictionaries and what the baselines need take now, in bytes.
+    pub fn resident_bytes(&self) -> usize {
+        let dictionaries: usize = self.index.classes.iter().map(IndexedClass::resident_bytes).sum();
+        dictionaries + self.baselines.as_ref().map_or(0, BaselineIndex::resident_bytes)
+    }
 }
 
 /// The calibration of a generation.
-pub(super) fn calibration(generation: &Generation) -> Option<Calibration> {
-    let held_out: Vec<(String, &[f64])> = generation
-        .classes
-        .iter()
-        .map(|class| (class.class.to_string(), class.report.held_out.as_slice()))
-        .collect();
-    Calibration::fit(held_out.iter().map(|(label, scores)| (label.as_str(), *scores)))
+pub(super) fn calibration(generation: &Generation) -> Result<Calibration, NotJudged> {
+    let labels: Vec<String> = generation.classes.iter().map(|c| c.class.to_string()).collect();
+    let classes = generation.classes.iter().zip(&labels);
+    Calibration::fit(classes.map(|(class, label)| class.report.held_out(label)))
 }
 
 /// What the baselines need of a generation. Ranking by sparse coding does without, so damage only costs the baselines.
@@ -54,6 +60,7 @@ pub(super) fn load(store: &Store) -> Result<(LiveIndex, bool), StoreError> {
     });
     let lost = match loaded {
         Ok(Some((generation, index, baselines))) => {
+            trim::after_loading(store, &generation)?;
             let live = LiveIndex {
                 calibration: calibration(&generation),
                 generation: Some(generation),
@@ -89,6 +96,6 @@ pub(super) fn empty(store: &Store) -> LiveIndex {
             classes: Vec::new(),
         },
         baselines: None,
-        calibration: None,
+        calibration: Err(NotJudged::TooFewShapes),
     }
 }

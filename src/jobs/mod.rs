@@ -14,6 +14,7 @@ mod plan;
 mod priority;
 mod progress;
 mod reindex;
+mod trim;
 mod worker;
 
 pub use error::JobError;

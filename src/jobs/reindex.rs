@@ -6,11 +6,12 @@ use super::failure::{ReindexError, code};
 use super::live::{LiveIndex, calibration, load_baselines};
 use super::plan::{Plan, ToLearn, plan, shape_key, skipped};
 use super::progress::Progress;
+use super::trim;
 use crate::cancel::Cancel;
 use crate::mesh::Limits;
 use crate::model::{
-    FailedShape, Generation, GenerationClass, GenerationShape, ReindexReport, ReindexScope, RelearnedClass,
-    Shape, SkippedClass,
+    FailedShape, Generation, GenerationClass, GenerationShape, Origin, ReindexReport, ReindexScope,
+    RelearnedClass, Shape, SkippedClass,
 };
 use crate::parameters::Parameters;
 use crate::pipeline::{Description, PipelineError, held_out_scores, learn_model};
@@ -191,7 +192,8 @@ fn learn_class(
     }
     let all: Vec<&Description> = descriptions.iter().map(|(_, description)| description).collect();
     let learnt = learn_model(&all, parameters, request.cancel, &|_, _| {}).and_then(|mut model| {
-        model.report.held_out = held_out_scores(&all, parameters, request.cancel)?;
+        let held_out = held_out_scores(&all, parameters, request.cancel)?;
+        (model.report.held_out, model.report.copies) = (held_out.distinct, held_out.copies);
         Ok(model)
     });
     let model = match learnt {
@@ -224,6 +226,7 @@ fn learn_class(
         Box::new(GenerationClass {
             class: id,
             name: class.class.name.clone(),
+            origin: Origin::Learnt,
             revision: class.class.revision,
             shapes: descriptions.len(),
             dictionary: class.key.clone(),
@@ -303,5 +306,11 @@ fn switch(
         index,
         baselines,
     }));
+    if let Some(generation) = &live.load().generation
+        && let Err(error) = trim::after_loading(store, generation)
+    {
+        // The store has closed and not opened again: the next request tells.
+        tracing::error!(%error, "the store's cache could not be dropped");
+    }
     Ok(Some(number))
 }

@@ -37,6 +37,17 @@ impl Generation {
     }
 }
 
+/// Where the dictionaries of a class come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Origin {
+    /// Learnt here from the shapes of the class.
+    #[default]
+    Learnt,
+    /// Taken over from a file that `export` wrote. They cannot be learnt again here.
+    Imported,
+}
+
 /// A class as a generation learnt it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GenerationClass {
@@ -44,6 +55,8 @@ pub struct GenerationClass {
     pub class: ClassId,
     /// Its name when it was learnt.
     pub name: ClassName,
+    /// Where its dictionaries come from.
+    pub origin: Origin,
     /// Its revision when it was learnt. The class is stale where its own is another.
     pub revision: u64,
     /// Shapes learnt from.

@@ -5,7 +5,7 @@ use crate::parameters::Parameters;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-/// Which classes a reindex learns again. Changed parameters make every class stale, whatever the scope.
+/// Which classes a reindex learns again. Changed parameters make every class stale.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ReindexScope {
@@ -14,7 +14,7 @@ pub enum ReindexScope {
     Stale,
     /// Every class, changed or not.
     All,
-    /// These, changed or not. Others keep the dictionary they have, even a stale one.
+    /// These, changed or not. Others keep the dictionary they have, even a stale one; those that have none stay without.
     Classes(Vec<ClassId>),
 }
 

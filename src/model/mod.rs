@@ -14,7 +14,7 @@ pub mod snapshot;
 pub mod text;
 
 pub use class::{Class, ClassName, ClassNameError};
-pub use generation::{Generation, GenerationClass, GenerationShape};
+pub use generation::{Generation, GenerationClass, GenerationShape, Origin};
 pub use id::{ClassId, IdError, JobId, KeyId, ShapeId, SnapshotId};
 pub use job::{
     FailedShape, Job, JobFailure, JobKind, JobState, ReindexReport, ReindexScope, RelearnedClass,

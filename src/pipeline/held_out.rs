@@ -1,5 +1,6 @@
-//! How well a class fits shapes of its own that it was learnt without: what confidence is calibrated by.
+//! How well a class fits shapes of its own that it was learnt without: what answers are judged by.
 
+use super::near_copies::groups;
 use super::prepared::OPEN_ABOVE;
 use super::{Description, PipelineError, learn_model};
 use crate::cancel::Cancel;
@@ -9,9 +10,18 @@ use crate::ranking::{View, prepare_views, score};
 /// Folds at most. More follow the class's final dictionary more closely and cost a dictionary each.
 const FOLDS: usize = 10;
 
-/// Scores of a class's training shapes, each under dictionaries learnt from the other folds' shapes; in no particular
-/// order, but for open ones, which say nothing of whole shapes and are not judged. Empty for a single shape, and with a
-/// ranking by Eq. 5, whose error grows with the number of vertices, so that one shape's says nothing of another's.
+/// Scores of a class's shapes under dictionaries they were left out of.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HeldOutScores {
+    /// Where their near copies were left out with them; in no particular order.
+    pub distinct: Vec<f64>,
+    /// Where they were not, because all shapes of the class are near copies of each other.
+    pub copies: Vec<f64>,
+}
+
+/// Scores of a class's training shapes, each under dictionaries learnt from the other folds' shapes; near copies are in the
+/// same fold. Open shapes have none: they say nothing of whole ones and are not judged. Empty for a single shape, and with
+/// a ranking by Eq. 5, whose error grows with the number of vertices, so that one shape's says nothing of another's.
 ///
 /// # Errors
 /// As [`learn_model`] and [`score`].
@@ -19,17 +29,46 @@ pub fn held_out_scores(
     shapes: &[&Description],
     parameters: &Parameters,
     cancel: &Cancel,
-) -> Result<Vec<f64>, PipelineError> {
+) -> Result<HeldOutScores, PipelineError> {
     if parameters.rank_by == RankBy::Frobenius || shapes.len() < 2 {
-        return Ok(Vec::new());
+        return Ok(HeldOutScores::default());
     }
-    let folds = shapes.len().min(FOLDS);
+    let groups = groups(shapes);
+    let distinct = groups.iter().any(|group| *group != groups[0]);
+    let groups = if distinct {
+        groups
+    } else {
+        (0..shapes.len()).collect()
+    };
+    let scores = scores(shapes, &groups, parameters, cancel)?;
+    Ok(if distinct {
+        HeldOutScores {
+            distinct: scores,
+            copies: Vec::new(),
+        }
+    } else {
+        HeldOutScores {
+            distinct: Vec::new(),
+            copies: scores,
+        }
+    })
+}
+
+/// Scores of the shapes, those of one group (numbered from 0) in the same fold.
+fn scores(
+    shapes: &[&Description],
+    groups: &[usize],
+    parameters: &Parameters,
+    cancel: &Cancel,
+) -> Result<Vec<f64>, PipelineError> {
+    let folds = FOLDS.min(1 + groups.iter().copied().max().unwrap_or(0));
     let mut scores = Vec::with_capacity(shapes.len());
     for fold in 0..folds {
-        let (held, rest): (Vec<_>, Vec<_>) = shapes.iter().enumerate().partition(|(i, _)| i % folds == fold);
-        let rest: Vec<&Description> = rest.into_iter().map(|(_, shape)| *shape).collect();
+        let all = shapes.iter().zip(groups);
+        let (held, rest): (Vec<_>, Vec<_>) = all.partition(|(_, group)| *group % folds == fold);
+        let rest: Vec<&Description> = rest.into_iter().map(|(shape, _)| *shape).collect();
         let model = learn_model(&rest, parameters, cancel, &|_, _| ())?;
-        for (_, shape) in held.into_iter().filter(|(_, s)| s.report.openness <= OPEN_ABOVE) {
+        for (shape, _) in held.into_iter().filter(|(s, _)| s.report.openness <= OPEN_ABOVE) {
             // A training shape's view on the fixed grid is there to be learnt from; as a query it would be open.
             let views: Vec<View> = shape
                 .views

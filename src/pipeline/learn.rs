@@ -4,7 +4,7 @@ use super::{Description, PipelineError};
 use crate::cancel::Cancel;
 use crate::coding::{CodingError, Dictionary, LearnReport, learn};
 use crate::parameters::{Channel, Hypothesis, Parameters};
-use crate::ranking::View;
+use crate::ranking::{HeldOut, View};
 use faer::MatRef;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -24,10 +24,25 @@ pub struct Model {
 pub struct ModelReport {
     /// One report per channel.
     pub channels: BTreeMap<Channel, LearnReport>,
-    /// Scores of the class's shapes under dictionaries they were left out of
+    /// Scores of the class's shapes under dictionaries they and their near copies were left out of
     /// ([`held_out_scores`](super::held_out_scores)); empty where none were asked for.
     #[serde(default)]
     pub held_out: Vec<f64>,
+    /// Scores of shapes under dictionaries they were left out of but not their near copies, where all of the class's are
+    /// near copies of each other.
+    #[serde(default)]
+    pub copies: Vec<f64>,
+}
+
+impl ModelReport {
+    /// What a calibration takes of it.
+    pub fn held_out<'a>(&'a self, label: &'a str) -> HeldOut<'a> {
+        HeldOut {
+            label,
+            scores: &self.held_out,
+            copies: &self.copies,
+        }
+    }
 }
 
 /// Learns one dictionary per channel from all signatures of the given training shapes. `progress(done, total)` counts

@@ -109,12 +109,12 @@ fn residuals(dictionary: &Dictionary, points: &Mat<f64>, codes: &Codes, residual
     for g in 0..points.ncols() {
         let first = residuals.len();
         residuals.extend_from_slice(points.col_as_slice(g));
-        for k in codes.offsets[g]..codes.offsets[g + 1] {
-            let atom = dictionary.atoms().col_as_slice(codes.atoms[k] as usize);
-            for (r, d) in residuals[first..].iter_mut().zip(atom) {
-                *r -= codes.values[k] * d;
-            }
-        }
+        let code = codes.offsets[g]..codes.offsets[g + 1];
+        dictionary.subtract(
+            &codes.atoms[code.clone()],
+            &codes.values[code],
+            &mut residuals[first..],
+        );
     }
 }
 

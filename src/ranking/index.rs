@@ -25,6 +25,15 @@ pub struct IndexedClass {
     pub shapes: Vec<IndexedShape>,
 }
 
+impl IndexedClass {
+    /// Memory its dictionaries take now, in bytes, those of single shapes included.
+    pub fn resident_bytes(&self) -> usize {
+        let of_shapes = self.shapes.iter().flat_map(|shape| shape.dictionaries.values());
+        let all = self.dictionaries.values().chain(of_shapes);
+        all.map(|dictionary| dictionary.resident_bytes()).sum()
+    }
+}
+
 /// A training shape with a dictionary of its own (method, step 9).
 #[derive(Clone, Debug)]
 pub struct IndexedShape {

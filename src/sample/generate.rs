@@ -1,7 +1,7 @@
 //! Species, pose number and seed → a mesh.
 
 use super::body::Body;
-use super::pose::{Clearance, draw, place};
+use super::pose::{Clearance, draw, place, stride};
 use super::remesh::remesh;
 use super::skeleton::Skeleton;
 use super::surface::polygonise;
@@ -71,6 +71,22 @@ pub enum SampleError {
     },
 }
 
+impl ZooOptions {
+    fn check(&self) -> Result<(), SampleError> {
+        let (least, most) = (200, 50_000);
+        let (min, max) = (self.min_vertices, self.max_vertices);
+        if min < least || max > most || min > max {
+            return Err(SampleError::Options {
+                least,
+                most,
+                min,
+                max,
+            });
+        }
+        Ok(())
+    }
+}
+
 /// A kind of creature: what a class of the zoo is.
 #[derive(Clone, Debug)]
 pub struct Species {
@@ -110,29 +126,57 @@ impl Species {
     /// [`SampleError::Options`] for an impossible range of vertices; [`SampleError::NoSurface`] when no redrawn pose
     /// gave a good surface, which happens only with too few vertices for the thinnest limb.
     pub fn pose(&self, seed: u64, pose: usize, options: &ZooOptions) -> Result<TriangleSoup, SampleError> {
-        let (least, most) = (200, 50_000);
+        options.check()?;
+        let mut rng = stream(seed, &self.name, pose as u64);
+        self.mesh(pose, options, &mut rng, |reach, turn, rng| {
+            self.body(reach, turn, rng)
+        })
+    }
+
+    /// Makes a frame of a walk: `time` in 0..1 is the share of the stride that is over. Frames of one seed show one
+    /// animal in one place: only its gait moves, and between frames that follow each other hardly.
+    ///
+    /// # Errors
+    /// As [`pose`](Self::pose).
+    pub fn walk(&self, seed: u64, time: f64, options: &ZooOptions) -> Result<TriangleSoup, SampleError> {
+        options.check()?;
+        let mut rng = stream(seed, &self.name, u64::MAX);
+        let gait: ChaCha8Rng = rng.clone();
+        self.mesh(0, options, &mut rng, |reach, turn, _| {
+            let whole = Motion::about([0.0; 3], turn);
+            let mut reach = reach;
+            loop {
+                let angles = stride(&self.skeleton, reach, time, &mut gait.clone());
+                let body = Body::new(&self.skeleton, &place(&self.skeleton, &angles, whole));
+                if self.clearance.holds(&body) || reach < 1e-3 {
+                    return body;
+                }
+                reach *= 0.9;
+            }
+        })
+    }
+
+    /// The surface of a posed body; the pose is drawn again where it gives none.
+    fn mesh(
+        &self,
+        pose: usize,
+        options: &ZooOptions,
+        rng: &mut ChaCha8Rng,
+        posed: impl Fn(f64, Rotation, &mut ChaCha8Rng) -> Body,
+    ) -> Result<TriangleSoup, SampleError> {
         let ZooOptions {
             min_vertices: min,
             max_vertices: max,
             upright,
         } = *options;
-        if min < least || max > most || min > max {
-            return Err(SampleError::Options {
-                least,
-                most,
-                min,
-                max,
-            });
-        }
-        let mut rng = stream(seed, &self.name, pose as u64);
         // A little inside the range, since simplification stops at the nearest collapse.
         let slack = (max - min) / 20;
         let vertices = rng.random_range(min + slack..=max - slack);
         for attempt in 0..ATTEMPTS {
             let reach = 0.93f64.powi((attempt as i32 - 4).max(0));
             // The body is turned against the grid, whose axes are fixed.
-            let turn = random_rotation(&mut rng);
-            let body = self.body(reach, turn, &mut rng);
+            let turn = random_rotation(rng);
+            let body = posed(reach, turn, rng);
             let offset: Vec3 = rng.random();
             let fine = polygonise(&body, self.spacing(&body, vertices, attempt), offset);
             if !is_sphere_if_closed(fine.vertices.len(), &fine.faces) {
@@ -142,11 +186,11 @@ impl Species {
                 continue;
             };
             if (min..=max).contains(&mesh.vertices.len()) && is_sphere(mesh.vertices.len(), &mesh.faces) {
-                let mut mesh = shuffled(mesh, &mut rng);
+                let mut mesh = shuffled(mesh, rng);
                 if upright {
                     mesh.vertices = mesh.vertices.iter().map(|&v| turn.apply_transposed(v)).collect();
                 } else {
-                    disguise(&mut mesh, &mut rng);
+                    disguise(&mut mesh, rng);
                 }
                 return Ok(mesh);
             }

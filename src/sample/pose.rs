@@ -17,6 +17,16 @@ pub type Angles = Vec<[f64; 3]>;
 pub fn draw(skeleton: &Skeleton, reach: f64, rng: &mut impl Rng) -> Angles {
     let walks = rng.random_bool(WALKING);
     let time: f64 = rng.random();
+    angles(skeleton, reach, walks.then_some(time), rng)
+}
+
+/// A moment of a gait: `time` in 0..1 is the share of the stride that is over. The same random stream at another time gives
+/// another moment of the same gait, in which the rest of the body is still.
+pub fn stride(skeleton: &Skeleton, reach: f64, time: f64, rng: &mut impl Rng) -> Angles {
+    angles(skeleton, reach, Some(time), rng)
+}
+
+fn angles(skeleton: &Skeleton, reach: f64, time: Option<f64>, rng: &mut impl Rng) -> Angles {
     let stride = rng.random_range(0.5..1.0);
     let within = |range: [f64; 2], u: f64| (range[0] + u * (range[1] - range[0])).to_radians();
     skeleton
@@ -25,9 +35,9 @@ pub fn draw(skeleton: &Skeleton, reach: f64, rng: &mut impl Rng) -> Angles {
         .map(|bone| {
             // The draws come in the same number whatever the bone does, so that one joint does not disturb the next.
             let [u, v, w]: [f64; 3] = rng.random();
-            let pitch = match bone.gait {
-                Some(phase) if walks => 0.5 + 0.5 * stride * (TAU * (time + phase)).sin(),
-                _ => u,
+            let pitch = match bone.gait.zip(time) {
+                Some((phase, time)) => 0.5 + 0.5 * stride * (TAU * (time + phase)).sin(),
+                None => u,
             };
             [
                 within(bone.range.pitch, pitch),

@@ -3,11 +3,10 @@
 use super::payload::only;
 use super::record::{Family, Record};
 use super::{Store, StoreError, backend::Batch, keys, record};
-use crate::coding::Dictionary;
+use crate::coding::{Dictionary, PreparedRoom};
 use crate::model::Generation;
 use crate::parameters::Channel;
 use crate::ranking::{Index, IndexedClass, IndexedShape};
-use faer::Mat;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -24,7 +23,29 @@ const CHANNELS: [(u8, Channel); 3] = [
 /// As many atoms as parameters may ask for.
 const MAX_ATOMS: usize = 5000;
 
-pub(super) struct DictionaryRecord(Dictionaries);
+/// Memory that the dictionaries of an index may take beyond their atoms, in bytes: what the classes that are used first are
+/// prepared in. 64 classes of the `default` preset take 40 MB.
+pub const PREPARED_BYTES: usize = 48 << 20;
+
+/// The atoms of one class or shape, by channel.
+pub(super) struct DictionaryRecord(BTreeMap<Channel, Atoms>);
+
+/// Atom after atom.
+struct Atoms {
+    dimension: usize,
+    values: Vec<f32>,
+}
+
+impl Atoms {
+    fn of(dictionary: &Dictionary) -> Self {
+        let atoms = dictionary.atoms();
+        let columns = (0..atoms.ncols()).flat_map(|j| atoms.col_as_slice(j));
+        Self {
+            dimension: dictionary.dimension(),
+            values: columns.map(|value| *value as f32).collect(),
+        }
+    }
+}
 
 /// A dictionary's Gram matrix has L² values, however short its record is.
 fn check_size(m: usize, l: usize) -> Result<(), String> {
@@ -41,32 +62,26 @@ impl Record for DictionaryRecord {
     /// For each channel: its number (u8), M and L (u32), then M · L atoms (f32), one atom after the other.
     fn encode(&self) -> Result<Vec<u8>, String> {
         let mut bytes = Vec::new();
-        for (channel, dictionary) in &self.0 {
+        for (channel, atoms) in &self.0 {
             let number = CHANNELS
                 .iter()
                 .find(|(_, c)| c == channel)
                 .ok_or("a channel has no number")?
                 .0;
-            let (m, l) = (dictionary.dimension(), dictionary.len());
+            let (m, l) = (atoms.dimension, atoms.values.len() / atoms.dimension.max(1));
             check_size(m, l)?;
             let narrow = |n: usize| u32::try_from(n).map_err(|_| "dictionary too large".to_owned());
             bytes.push(number);
             bytes.extend_from_slice(&narrow(m)?.to_le_bytes());
             bytes.extend_from_slice(&narrow(l)?.to_le_bytes());
-            bytes.reserve(4 * m * l);
-            let atoms = dictionary.atoms();
-            for j in 0..l {
-                for i in 0..m {
-                    bytes.extend_from_slice(&(atoms[(i, j)] as f32).to_le_bytes());
-                }
-            }
+            bytes.extend(atoms.values.iter().flat_map(|value| value.to_le_bytes()));
         }
         Ok(bytes)
     }
 
     fn decode(version: u16, payload: &[u8]) -> Result<Self, String> {
         only(version, 1)?;
-        let mut dictionaries = Dictionaries::new();
+        let mut dictionaries = BTreeMap::new();
         let mut rest = payload;
         while let Some((&number, after)) = rest.split_first() {
             let channel = CHANNELS
@@ -87,17 +102,16 @@ impl Record for DictionaryRecord {
             let (values, after) = after
                 .split_at_checked(length)
                 .ok_or("cut short in a dictionary's atoms")?;
-            let atoms = Mat::from_fn(m, l, |i, j| {
-                let at = 4 * (j * m + i);
-                f64::from(f32::from_le_bytes([
-                    values[at],
-                    values[at + 1],
-                    values[at + 2],
-                    values[at + 3],
-                ]))
-            });
-            let dictionary = Dictionary::new(atoms).map_err(|e| e.to_string())?;
-            dictionaries.insert(channel, Arc::new(dictionary));
+            let atoms = Atoms {
+                dimension: m,
+                values: values
+                    .as_chunks()
+                    .0
+                    .iter()
+                    .map(|value| f32::from_le_bytes(*value))
+                    .collect(),
+            };
+            dictionaries.insert(channel, atoms);
             rest = after;
         }
         Ok(Self(dictionaries))
@@ -112,7 +126,8 @@ impl Store {
     /// [`StoreError::ReadOnly`], or the write's failure.
     pub fn put_dictionaries(&self, key: &str, dictionaries: &Dictionaries) -> Result<u64, StoreError> {
         let key = keys::dictionary(key);
-        let bytes = record::seal(&key, &DictionaryRecord(dictionaries.clone()))?;
+        let atoms = dictionaries.iter().map(|(channel, d)| (*channel, Atoms::of(d)));
+        let bytes = record::seal(&key, &DictionaryRecord(atoms.collect()))?;
         let size = bytes.len() as u64;
         let mut batch = Batch::default();
         batch.put(key, bytes);
@@ -125,12 +140,26 @@ impl Store {
     /// # Errors
     /// [`StoreError::Damaged`] where the record is not what was written.
     pub fn dictionaries(&self, key: &str) -> Result<Option<(Dictionaries, u64)>, StoreError> {
+        self.dictionaries_in(key, &PreparedRoom::new(PREPARED_BYTES))
+    }
+
+    fn dictionaries_in(
+        &self,
+        key: &str,
+        room: &Arc<PreparedRoom>,
+    ) -> Result<Option<(Dictionaries, u64)>, StoreError> {
         let key = keys::dictionary(key);
         let Some(bytes) = self.inner.backend.get(&key)? else {
             return Ok(None);
         };
         let record: DictionaryRecord = record::unseal(&key, &bytes)?;
-        Ok(Some((record.0, bytes.len() as u64)))
+        let dictionaries = record.0.into_iter().map(|(channel, atoms)| {
+            let dictionary = Dictionary::single(atoms.values, atoms.dimension, room)
+                .map_err(|e| StoreError::damaged(record::describe(&key), e.to_string()))?;
+            Ok((channel, Arc::new(dictionary)))
+        });
+        let dictionaries = dictionaries.collect::<Result<_, StoreError>>()?;
+        Ok(Some((dictionaries, bytes.len() as u64)))
     }
 
     /// The index of a generation, all dictionaries in memory. A class's label is its identifier as text, and so is a
@@ -139,8 +168,9 @@ impl Store {
     /// # Errors
     /// [`StoreError::Damaged`] where a dictionary is missing or not what was written.
     pub fn load_index(&self, generation: &Generation) -> Result<Index, StoreError> {
+        let room = PreparedRoom::new(PREPARED_BYTES);
         let load = |key: &str| {
-            self.dictionaries(key)?
+            self.dictionaries_in(key, &room)?
                 .map(|(dictionaries, _)| dictionaries)
                 .ok_or_else(|| StoreError::damaged(format!("dictionary {key}"), "it is missing"))
         };

@@ -53,7 +53,7 @@ pub use api_keys::MAX_KEYS;
 pub use backend::Backend;
 pub use catalogue::AddedShape;
 pub use damage::Damage;
-pub use dictionaries::Dictionaries;
+pub use dictionaries::{Dictionaries, PREPARED_BYTES};
 pub use error::{OriginalDamage, StoreError};
 pub use garbage::Garbage;
 pub use idempotency::Remembered;
@@ -207,6 +207,16 @@ impl Inner {
 }
 
 impl Store {
+    /// Lets go of what the engine keeps in memory of its records; it is opened anew, and requests wait for that.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`] where it cannot be opened again.
+    pub fn drop_cache(&self) -> Result<(), StoreError> {
+        // No write is under way while the writer is held.
+        let _writer = self.inner.writer();
+        self.inner.backend.reopen(&mut || Ok(()))
+    }
+
     /// The data directory.
     pub fn path(&self) -> &Path {
         &self.inner.path

@@ -1,12 +1,13 @@
-//! The payloads of generations, versions 1 and 2, and of jobs, version 1.
+//! The payloads of generations, versions 1 to 3, and of jobs, version 1.
 
 use super::payload::{from_json, instant, only, pack, to_json, unpack};
 use super::record::{Family, Record};
 use crate::model::{
     ClassId, ClassName, Generation, GenerationClass, GenerationShape, Job, JobFailure, JobId, JobState,
-    ShapeId, Step,
+    Origin, ShapeId, Step,
 };
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 #[derive(Serialize, Deserialize)]
 struct GenerationV1 {
@@ -23,6 +24,16 @@ struct GenerationV2 {
     baselines: Option<String>,
 }
 
+/// Version 2 with the imported classes after it.
+#[derive(Serialize, Deserialize)]
+struct GenerationV3 {
+    second: GenerationV2,
+    imported: Vec<[u8; 16]>,
+}
+
+/// What `import` put into the keys of dictionaries before a generation knew which of its classes are imported.
+const IMPORTED_KEY: &str = "-imported-";
+
 #[derive(Serialize, Deserialize)]
 struct GenerationClassV1 {
     class: [u8; 16],
@@ -38,7 +49,7 @@ struct GenerationClassV1 {
 
 impl Record for Generation {
     const FAMILY: Family = Family::Generation;
-    const VERSION: u16 = 2;
+    const VERSION: u16 = 3;
 
     fn encode(&self) -> Result<Vec<u8>, String> {
         let classes = self
@@ -62,34 +73,56 @@ impl Record for Generation {
                 })
             })
             .collect::<Result<_, String>>()?;
-        pack(&GenerationV2 {
-            first: GenerationV1 {
-                number: self.number,
-                parameters: to_json(&self.parameters)?,
-                created_at: self.created_at.as_nanosecond(),
-                classes,
+        let imported = self.classes.iter().filter(|c| c.origin == Origin::Imported);
+        pack(&GenerationV3 {
+            second: GenerationV2 {
+                first: GenerationV1 {
+                    number: self.number,
+                    parameters: to_json(&self.parameters)?,
+                    created_at: self.created_at.as_nanosecond(),
+                    classes,
+                },
+                baselines: self.baselines.clone(),
             },
-            baselines: self.baselines.clone(),
+            imported: imported.map(|c| c.class.to_bytes()).collect(),
         })
     }
 
     fn decode(version: u16, payload: &[u8]) -> Result<Self, String> {
-        let GenerationV2 { first: v, baselines } = match version {
-            1 => GenerationV2 {
+        let before = |second: GenerationV2| GenerationV3 {
+            imported: second
+                .first
+                .classes
+                .iter()
+                .filter(|c| c.dictionary.contains(IMPORTED_KEY))
+                .map(|c| c.class)
+                .collect(),
+            second,
+        };
+        let GenerationV3 { second, imported } = match version {
+            1 => before(GenerationV2 {
                 first: unpack(payload)?,
                 baselines: None,
-            },
+            }),
+            2 => before(unpack(payload)?),
             other => {
-                only(other, 2)?;
+                only(other, 3)?;
                 unpack(payload)?
             }
         };
+        let GenerationV2 { first: v, baselines } = second;
+        let imported: BTreeSet<[u8; 16]> = imported.into_iter().collect();
         let classes = v
             .classes
             .into_iter()
             .map(|c| {
                 Ok(GenerationClass {
                     class: ClassId::from_bytes(c.class),
+                    origin: if imported.contains(&c.class) {
+                        Origin::Imported
+                    } else {
+                        Origin::Learnt
+                    },
                     name: ClassName::stored(&c.name).map_err(|e| e.to_string())?,
                     revision: c.revision,
                     shapes: c.shapes as usize,
@@ -211,21 +244,47 @@ mod tests {
     use super::*;
     use crate::parameters::Parameters;
 
-    #[test]
-    fn a_generation_of_version_1_has_no_baselines() {
-        let first = || GenerationV1 {
+    fn first(dictionary: &str) -> GenerationV1 {
+        GenerationV1 {
             number: 3,
             parameters: to_json(&Parameters::default()).unwrap(),
             created_at: 0,
-            classes: Vec::new(),
-        };
-        let old = Generation::decode(1, &pack(&first()).unwrap()).unwrap();
+            classes: vec![GenerationClassV1 {
+                class: [7; 16],
+                name: "cat".to_owned(),
+                revision: 2,
+                shapes: 5,
+                dictionary: dictionary.to_owned(),
+                bytes: 1,
+                atoms: 1,
+                report: "{\"channels\":{}}".to_owned(),
+                shape_dictionaries: Vec::new(),
+            }],
+        }
+    }
+
+    #[test]
+    fn a_generation_of_version_1_has_no_baselines() {
+        let old = Generation::decode(1, &pack(&first("class-x")).unwrap()).unwrap();
         assert_eq!((old.number, &old.baselines), (3, &None));
+        assert_eq!(old.classes[0].origin, Origin::Learnt);
         let mut new = old;
         new.baselines = Some("model-x".to_owned());
         let again = Generation::decode(Generation::VERSION, &new.encode().unwrap()).unwrap();
         assert_eq!(again, new);
-        assert!(Generation::decode(3, &new.encode().unwrap()).is_err());
+        assert!(Generation::decode(4, &new.encode().unwrap()).is_err());
+    }
+
+    #[test]
+    fn imported_classes_are_known_before_and_after_version_3() {
+        let old = pack(&GenerationV2 {
+            first: first("0190-imported-3"),
+            baselines: None,
+        });
+        let old = Generation::decode(2, &old.unwrap()).unwrap();
+        assert_eq!(old.classes[0].origin, Origin::Imported);
+        let again = Generation::decode(Generation::VERSION, &old.encode().unwrap()).unwrap();
+        assert_eq!(again, old);
     }
     #[test]
     fn every_state_of_a_job_comes_back_from_its_number() {

@@ -135,6 +135,39 @@ fn index_query_export_and_import_in_a_local_directory() {
             "stored and exported dictionaries are the same numbers"
         );
     }
+    // What answers are judged by and what the baselines need went along; what did not is said.
+    for answer in [&exported, &imported] {
+        assert_eq!(answer["absent"], serde_json::json!(["the training shapes"]));
+    }
+    assert_eq!(from_file["verdict"], stored["verdict"]);
+    assert_eq!(elsewhere["verdict"], stored["verdict"]);
+    let by_dna = |data: &str| {
+        let args = [
+            "query",
+            "unseen.obj",
+            "--data",
+            data,
+            "--rank-by",
+            "shape_dna",
+            "--json",
+        ];
+        last_json(&answer(dir.path(), &args))
+    };
+    let (here, there) = (by_dna("shapelex-data"), by_dna("other"));
+    assert_eq!(here["classes"][0]["score"], there["classes"][0]["score"]);
+    // Another class beside the imported ones: these stay.
+    std::fs::create_dir_all(dir.path().join("more/blob")).unwrap();
+    std::fs::copy(&unseen, dir.path().join("more/blob/blob.obj")).unwrap();
+    let more = last_json(&answer(
+        dir.path(),
+        &["index", "more", "--data", "other", "--json"],
+    ));
+    assert_eq!(more["job"]["result"]["reused"].as_array().unwrap().len(), 3);
+    let beside = last_json(&answer(
+        dir.path(),
+        &["query", "unseen.obj", "--data", "other", "--json"],
+    ));
+    assert_eq!(beside["compared"], 4);
     let nothing = run(dir.path(), &["export", "--out", file, "--data", "nowhere"]);
     assert_eq!(nothing.status.code(), Some(2));
     assert!(!dir.path().join("nowhere").exists());

@@ -56,7 +56,11 @@ fn mesh(bytes: Vec<u8>) -> NewShape {
     }
 }
 
-fn small() -> Parameters {
+pub fn surface_shape(lobes: f64, pose: usize) -> NewShape {
+    mesh(surface(lobes, pose, 14))
+}
+
+pub fn small() -> Parameters {
     Parameters {
         eigenpairs: 40,
         energies: 40,
@@ -70,11 +74,11 @@ fn small() -> Parameters {
     }
 }
 
-fn open(path: &Path) -> Store {
+pub fn open(path: &Path) -> Store {
     Store::open(path, &StoreOptions::default()).unwrap()
 }
 
-fn start(store: &Store) -> Jobs {
+pub fn start(store: &Store) -> Jobs {
     let options = JobOptions {
         indexing_threads: 2,
         queue_limit: 3,
@@ -83,12 +87,12 @@ fn start(store: &Store) -> Jobs {
     Jobs::start(store.clone(), options).unwrap()
 }
 
-fn reindex(scope: ReindexScope, parameters: Option<Parameters>) -> JobKind {
+pub fn reindex(scope: ReindexScope, parameters: Option<Parameters>) -> JobKind {
     JobKind::Reindex { scope, parameters }
 }
 
 /// Follows a job to its end.
-fn wait(jobs: &Jobs, id: JobId) -> Job {
+pub fn wait(jobs: &Jobs, id: JobId) -> Job {
     let mut job = jobs.subscribe(id).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     runtime.block_on(async { while job.changed().await.is_ok() {} });
@@ -98,14 +102,14 @@ fn wait(jobs: &Jobs, id: JobId) -> Job {
     job
 }
 
-fn done(jobs: &Jobs, kind: JobKind) -> Job {
+pub fn done(jobs: &Jobs, kind: JobKind) -> Job {
     let id = jobs.enqueue(kind).unwrap().id;
     let job = wait(jobs, id);
     assert_eq!(job.state, JobState::Succeeded, "{:?}", job.failure);
     job
 }
 
-fn class_of(store: &Store, text: &str, lobes: f64, poses: std::ops::Range<usize>) -> ClassId {
+pub fn class_of(store: &Store, text: &str, lobes: f64, poses: std::ops::Range<usize>) -> ClassId {
     let id = store.create_class(name(text)).unwrap().id;
     let shapes = poses.map(|pose| mesh(surface(lobes, pose, 14))).collect();
     store.add_shapes(id, shapes).unwrap();
@@ -402,6 +406,7 @@ fn atoms(jobs: &Jobs, class: ClassId) -> Vec<f64> {
         .find(|c| c.label == class.to_string())
         .unwrap();
     let atoms = class.dictionaries[&Channel::Plain].atoms();
+    let atoms = atoms.as_ref();
     (0..atoms.ncols())
         .flat_map(|j| (0..atoms.nrows()).map(move |i| atoms[(i, j)]))
         .collect()

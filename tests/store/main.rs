@@ -4,6 +4,7 @@
 mod catalogue;
 mod faults;
 mod formats;
+mod imports;
 mod jobs;
 mod power_cut;
 mod quotas;

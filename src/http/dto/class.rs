@@ -1,7 +1,7 @@
 //! Classes on the wire.
 
 use super::time;
-use crate::model::{Class, Generation};
+use crate::model::{Class, Generation, GenerationClass};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -42,7 +42,12 @@ pub enum IndexState {
 impl IndexState {
     /// How a class stands to a generation.
     pub fn of(class: &Class, generation: Option<&Generation>) -> Self {
-        match generation.and_then(|g| g.class(class.id)) {
+        Self::of_learnt(class, generation.and_then(|g| g.class(class.id)))
+    }
+
+    /// How a class stands to what was learnt of it.
+    pub fn of_learnt(class: &Class, learnt: Option<&GenerationClass>) -> Self {
+        match learnt {
             None => Self::NotIndexed,
             Some(learnt) if learnt.revision == class.revision => Self::Current,
             Some(_) => Self::Stale,

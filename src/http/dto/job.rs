@@ -4,11 +4,13 @@ use super::class::ClassRef;
 use super::parameters::{ParameterOverrides, ParametersDto, PresetName};
 use super::time;
 use crate::model::{Job, JobKind, ReindexReport, ReindexScope};
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::Value;
 use utoipa::ToSchema;
 
 /// Which classes are learnt again.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ScopeDto {
     /// Those whose shapes or parameters changed, and those never learnt.
@@ -16,8 +18,40 @@ pub enum ScopeDto {
     Stale,
     /// Every class.
     All,
-    /// These, by id or name.
+    /// These, by id or name, and no others: those keep what the index has of them.
     Classes(Vec<String>),
+}
+
+/// What a scope may be, for messages.
+const SCOPES: &str = "\"stale\", \"all\" or {\"classes\": [\"…\"]}";
+
+impl<'de> Deserialize<'de> for ScopeDto {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Value::deserialize(deserializer)?;
+        Self::of(&value).ok_or_else(|| {
+            let shown: String = value.to_string().chars().take(100).collect();
+            D::Error::custom(format!("expected {SCOPES}, found {shown}"))
+        })
+    }
+}
+
+impl ScopeDto {
+    fn of(value: &Value) -> Option<Self> {
+        match value {
+            Value::Null => Some(Self::default()),
+            Value::String(name) => match name.as_str() {
+                "stale" => Some(Self::Stale),
+                "all" => Some(Self::All),
+                _ => None,
+            },
+            Value::Object(members) if members.len() == 1 => {
+                let names = members.get("classes")?.as_array()?.iter();
+                let names = names.map(|name| name.as_str().map(str::to_owned));
+                names.collect::<Option<_>>().map(Self::Classes)
+            }
+            _ => None,
+        }
+    }
 }
 
 /// A reindex. Everything may be left out: `{}` and an empty body learn what is stale with the parameters the index
@@ -26,7 +60,8 @@ pub enum ScopeDto {
 #[serde(default, deny_unknown_fields)]
 #[schema(example = json!({"scope": "stale", "preset": "default", "parameters": {"atoms": 128}}))]
 pub struct StartReindex {
-    /// Which classes; `stale` where it is left out.
+    /// Which classes; `stale` where it is left out or `null`.
+    #[schema(value_type = Option<ScopeDto>)]
     pub scope: ScopeDto,
     /// Start from the values of this preset instead of those the index has.
     pub preset: Option<PresetName>,
@@ -41,9 +76,10 @@ pub struct StartReindex {
 pub struct JobEvent {
     /// `progress`.
     pub event: String,
-    /// The job's id.
+    /// Grows from event to event of a job, over connections and restarts too: microseconds since 1970. A connection that
+    /// gives it back as `last-event-id` after the final event gets 204, after which browsers do not connect again.
     pub id: String,
-    /// The job as JSON text, see `JobDto`.
+    /// The job as JSON text, see `JobDto`; `parameters` only in the first event of a connection.
     pub data: String,
 }
 

@@ -3,6 +3,7 @@
 use super::class::ClassRef;
 use super::parameters::{HypothesisName, ParametersDto, QueryRankByName};
 use super::shape::ReportDto;
+use crate::ranking::{Verdict, VerdictKind};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::{IntoParams, ToSchema};
@@ -27,6 +28,17 @@ pub struct QueryOptions {
     /// Where not even one class was scored by then, the query fails with `deadline_exceeded`.
     #[param(minimum = 1)]
     pub time_limit_ms: Option<u64>,
+    /// What is answered beside the ranking: `samples` adds the signals that were coded.
+    #[param(inline)]
+    pub details: Option<DetailsName>,
+}
+
+/// What an answer has beside the ranking.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DetailsName {
+    /// The sampled vertices and their signals.
+    Samples,
 }
 
 /// How well a class regenerates the query, or how near it is. What only sparse coding knows is `null` where the
@@ -59,6 +71,68 @@ pub struct RankedClass {
     pub p_value: Option<f64>,
 }
 
+/// What an answer is taken to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum VerdictKindName {
+    /// One class is possible.
+    Class,
+    /// Several classes are possible.
+    Several,
+    /// No class is possible.
+    NoneOfThese,
+    /// What is possible cannot be told.
+    NotJudged,
+}
+
+/// What the answer says, for people: about the first five classes of the ranking, however many are asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct VerdictDto {
+    /// What the answer is taken to be.
+    pub kind: VerdictKindName,
+    /// One sentence, ready to be shown: "cat (at least 97 % of such answers are right)", "cat or dog (…)", "none of the known
+    /// classes; nearest: michael", "nearest: cat (not judged: …)".
+    pub text: String,
+    /// 1 less the largest p-value of the classes the text does not name as possible: of all queries of known classes, at most
+    /// the rest gets so clear an answer that is wrong. `null` where it cannot be told.
+    pub probability: Option<f64>,
+    /// Why it is not judged; `null` where it is.
+    pub reason: Option<String>,
+}
+
+impl From<Verdict> for VerdictDto {
+    fn from(verdict: Verdict) -> Self {
+        Self {
+            kind: match verdict.kind {
+                VerdictKind::Class => VerdictKindName::Class,
+                VerdictKind::Several => VerdictKindName::Several,
+                VerdictKind::NoneOfThese => VerdictKindName::NoneOfThese,
+                VerdictKind::NotJudged => VerdictKindName::NotJudged,
+            },
+            text: verdict.text,
+            probability: verdict.probability,
+            reason: verdict.reason.map(|reason| reason.to_string()),
+        }
+    }
+}
+
+/// Which vertices of the prepared mesh were sampled, and their signals under one view.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct SampledView {
+    /// The way of preparing the query.
+    pub hypothesis: HypothesisName,
+    /// The dictionaries it is coded under: `plain`, `whitened` or `fixed_grid`.
+    pub channel: &'static str,
+    /// Full area over visible area that was assumed; 1 unless doubled.
+    pub area_scale: f64,
+    /// Whether the mean of the smallest 80 % of the objectives stands for the mean, since something of the surface is missing.
+    pub bounded: bool,
+    /// Vertices of the prepared mesh, in the order of the signals.
+    pub vertices: Vec<u32>,
+    /// The signals that were coded, M values each.
+    pub signals: Vec<Vec<f64>>,
+}
+
 /// How well a single training shape regenerates the query, or how near it is.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct RankedShape {
@@ -79,12 +153,19 @@ pub struct RankedShape {
 pub struct QueryAnswer {
     /// The mesh's name.
     pub name: String,
+    /// What the answer says, for people.
+    pub verdict: VerdictDto,
     /// Classes, best first.
     pub classes: Vec<RankedClass>,
     /// Training shapes, best first, where the index has dictionaries of single shapes or the ranking is not by sparse
     /// coding.
     pub nearest_shapes: Vec<RankedShape>,
-    /// Relative margin of the best class to the runner-up, 0 to 1; 1 where there is only one.
+    /// The verdict's probability, `null` where it cannot be told.
+    pub probability: Option<f64>,
+    /// By how much the runner-up is worse than the best class, relative to it, 0 to 1; 1 where there is only one class.
+    pub margin: f64,
+    /// The same as `margin`, under its former name. It is no probability.
+    #[schema(deprecated)]
     pub confidence: f64,
     /// Classes that were compared with.
     pub compared: usize,
@@ -93,8 +174,9 @@ pub struct QueryAnswer {
     /// classes.
     pub pruned: usize,
     /// Whether the query is believed to be of none of the indexed classes: no answered class has a p-value above 0.05.
-    /// `null` where that cannot be told: with fewer than 19 training shapes beside each class's first, of an open
-    /// surface such as a single view, and where the ranking is not by the index's own measure.
+    /// `null` where that cannot be told: with fewer than 19 training shapes beside each class's first, where the training
+    /// shapes of the best class are near copies of each other, of an open surface such as a single view, where the ranking
+    /// is not by the index's own measure, and where the answer is partial.
     pub none_of_these: Option<bool>,
     /// The classes with a p-value above 0.05. For 95 of 100 queries that are like the training shapes the true class is
     /// among them. Empty where nothing can be told.
@@ -119,6 +201,10 @@ pub struct QueryAnswer {
     pub rank_by: QueryRankByName,
     /// The parameters of the index.
     pub parameters: ParametersDto,
+    /// The signals that were coded, where `details=samples` asks for them: with the dictionaries of an export, `lambda` and
+    /// `rank_by` a score can be computed outside (method, section 8).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub samples: Option<Vec<SampledView>>,
     /// Milliseconds by stage: `wait`, `read`, `prepare`, `laplacian`, `eigenpairs`, `signatures`, `ranking` and
     /// `total`.
     pub timings_ms: BTreeMap<String, f64>,

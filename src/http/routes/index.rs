@@ -2,44 +2,68 @@
 
 use crate::http::AppState;
 use crate::http::dto::class::IndexState;
-use crate::http::dto::index::{IndexAnswer, IndexClass};
+use crate::http::dto::index::{IndexAnswer, IndexClass, IndexQuery, IndexTotals};
 use crate::http::dto::parameters::{ParametersAnswer, PresetDto};
+use crate::http::dto::{Page, PageQuery};
+use crate::http::extract::ApiQuery;
 use crate::http::problem::Problem;
-use crate::model::Class;
+use crate::model::{Class, ClassId, GenerationClass};
 use crate::parameters::{Parameters, Preset};
 use crate::store::Store;
 use axum::Json;
 use axum::extract::State;
+use std::collections::BTreeMap;
 
 /// Show the index
 ///
-/// The generation queries are answered from, and how every class stands to it.
+/// The generation queries are answered from, and how the classes stand to it, a page of up to 1000 at a time.
 #[utoipa::path(
-    get, path = "/v1/index", tag = "index",
+    get, path = "/v1/index", tag = "index", params(IndexQuery),
     responses((status = 200, description = "The index", body = IndexAnswer))
 )]
-pub async fn get_index(State(state): State<AppState>) -> Result<Json<IndexAnswer>, Problem> {
+pub async fn get_index(
+    State(state): State<AppState>,
+    ApiQuery(query): ApiQuery<IndexQuery>,
+) -> Result<Json<IndexAnswer>, Problem> {
+    let page = PageQuery::from(query);
+    let (limit, after) = (page.limit()?, page.after::<ClassId>()?);
     let live = state.jobs.live_index();
     let classes = state.blocking(|s| all_classes(&s.store)).await?;
     let generation = live.generation.as_ref();
-    let classes: Vec<IndexClass> = classes
+    let learnt: BTreeMap<ClassId, (&GenerationClass, usize)> = generation
         .into_iter()
-        .map(|class| {
-            let learnt = generation.and_then(|g| g.class(class.id));
-            IndexClass {
-                index_state: IndexState::of(&class, generation),
-                id: class.id.to_string(),
-                name: class.name.to_string(),
-                shapes: class.shapes,
-                shapes_learnt: learnt.map_or(0, |c| c.shapes),
-                atoms: learnt.map_or(0, |c| c.atoms),
-                bytes: learnt.map_or(0, |c| c.bytes),
-                shape_dictionaries: learnt.map_or(0, |c| c.shape_dictionaries.len()),
-            }
-        })
+        .flat_map(|g| &g.classes)
+        .zip(&live.index.classes)
+        .map(|(class, indexed)| (class.class, (class, indexed.resident_bytes())))
         .collect();
+    let state_of = |class: &Class| IndexState::of_learnt(class, learnt.get(&class.id).map(|(c, _)| *c));
+    let mut totals = IndexTotals {
+        classes: classes.len(),
+        ..IndexTotals::default()
+    };
+    for class in &classes {
+        match state_of(class) {
+            IndexState::Current => totals.current += 1,
+            IndexState::Stale => totals.stale += 1,
+            IndexState::NotIndexed => totals.not_indexed += 1,
+        }
+    }
+    let present = classes.iter().filter_map(|class| learnt.get(&class.id));
+    let bytes = present.map(|(class, _)| class.bytes).sum();
+    let found = classes
+        .into_iter()
+        .filter(|class| after.is_none_or(|after| class.id > after));
+    let page = Page::cut(
+        found.take(limit + 1).collect(),
+        limit,
+        |class| class.id.to_string(),
+        |class| {
+            let state = state_of(&class);
+            index_class(&class, state, learnt.get(&class.id).copied())
+        },
+    );
     let names = |state| {
-        classes
+        page.items
             .iter()
             .filter(|c| c.index_state == state)
             .map(|c| c.name.clone())
@@ -51,9 +75,29 @@ pub async fn get_index(State(state): State<AppState>) -> Result<Json<IndexAnswer
         parameters: generation.map(|g| g.parameters.clone().into()),
         stale: names(IndexState::Stale),
         not_indexed: names(IndexState::NotIndexed),
-        bytes: classes.iter().map(|c| c.bytes).sum(),
-        classes,
+        totals,
+        bytes,
+        resident_bytes: live.resident_bytes() as u64,
+        next_cursor: page.next_cursor,
+        classes: page.items,
     }))
+}
+
+fn index_class(class: &Class, state: IndexState, learnt: Option<(&GenerationClass, usize)>) -> IndexClass {
+    let resident_bytes = learnt.map_or(0, |(_, bytes)| bytes as u64);
+    let learnt = learnt.map(|(class, _)| class);
+    IndexClass {
+        index_state: state,
+        id: class.id.to_string(),
+        name: class.name.to_string(),
+        shapes: class.shapes,
+        shapes_learnt: learnt.map_or(0, |c| c.shapes),
+        atoms: learnt.map_or(0, |c| c.atoms),
+        bytes: learnt.map_or(0, |c| c.bytes),
+        resident_bytes,
+        origin: learnt.map(|c| c.origin.into()),
+        shape_dictionaries: learnt.map_or(0, |c| c.shape_dictionaries.len()),
+    }
 }
 
 fn all_classes(store: &Store) -> Result<Vec<Class>, Problem> {

@@ -139,7 +139,7 @@ fn scope(parts: &Parts, scope: ScopeDto) -> Result<ReindexScope, Problem> {
                 Code::InvalidField,
                 "scope.classes names no class; name some, or use \"all\" or \"stale\"",
             )
-            .with("name", "scope"));
+            .with("name", "scope.classes"));
         }
         ScopeDto::Classes(classes) => {
             let mut ids = Vec::with_capacity(classes.len());
@@ -212,27 +212,75 @@ pub async fn cancel_job(
 /// Follow a job
 ///
 /// As server-sent events: an event `progress` with the job as JSON whenever it changes. The stream ends after the
-/// event with the final state.
+/// event with the final state; where `last-event-id` is that event's the answer is 204.
 #[utoipa::path(
     get, path = "/v1/jobs/{job}/events", tag = "jobs",
-    params(("job" = String, Path, description = "The job's id")),
-    responses((status = 200, description = "Events", body = JobEvent, content_type = "text/event-stream"))
+    params(
+        ("job" = String, Path, description = "The job's id"),
+        ("last-event-id" = Option<String>, Header, description = "The id of the last event that arrived, as browsers send \
+            it when they connect again. The events go on with greater ids, from the state the job has now"),
+    ),
+    responses(
+        (status = 200, description = "Events", body = JobEvent, content_type = "text/event-stream"),
+        (status = 204, description = "The final event has arrived before"),
+    )
 )]
 pub async fn follow_job(
     State(state): State<AppState>,
+    headers: HeaderMap,
     ApiPath(job): ApiPath<String>,
-) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Problem> {
+) -> Result<Response, Problem> {
     let id = job_id(&job)?;
+    let seen = headers
+        .get("last-event-id")
+        .and_then(|value| value.to_str().ok()?.trim().parse().ok())
+        .unwrap_or(0);
     let changes = state.blocking(move |s| Ok(s.jobs.subscribe(id)?)).await?;
+    if ended_at(&changes.borrow()).is_some_and(|ended| seen >= ended) {
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    }
     let stopping = state.stopping.clone();
+    let mut events = Events::after(seen);
     let events = until_finished(WatchStream::new(changes))
-        .map(|job| {
-            let event = Event::default().event("progress").id(job.id.to_string());
-            let body = serde_json::to_string(&JobDto::from(job)).unwrap_or_default();
-            Ok(event.data(body))
-        })
+        .map(move |job| Ok::<_, Infallible>(events.event(job)))
         .take_until(stopping.cancelled_owned());
-    Ok(Sse::new(events).keep_alive(KeepAlive::default()))
+    Ok(Sse::new(events).keep_alive(KeepAlive::default()).into_response())
+}
+
+/// When a job reached its final state, in microseconds since 1970.
+fn ended_at(job: &Job) -> Option<u64> {
+    let ended = job.finished_at.filter(|_| job.state.is_finished())?;
+    u64::try_from(ended.as_microsecond()).ok()
+}
+
+/// Makes the events of one connection.
+struct Events {
+    /// The id of the last one.
+    last: u64,
+    first: bool,
+}
+
+impl Events {
+    fn after(last: u64) -> Self {
+        Self { last, first: true }
+    }
+
+    fn event(&mut self, job: Job) -> Event {
+        let now = u64::try_from(jiff::Timestamp::now().as_microsecond()).unwrap_or(0);
+        let at = ended_at(&job).unwrap_or(now);
+        self.last = at.max(self.last.saturating_add(1));
+        // Strings, numbers and maps with string keys always serialise.
+        let mut body = serde_json::to_value(JobDto::from(job)).unwrap_or_default();
+        if !std::mem::take(&mut self.first)
+            && let Some(members) = body.as_object_mut()
+        {
+            members.remove("parameters");
+        }
+        Event::default()
+            .event("progress")
+            .id(self.last.to_string())
+            .data(body.to_string())
+    }
 }
 
 /// The changes of a job up to and with its final state.
