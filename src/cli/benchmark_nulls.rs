@@ -150,7 +150,11 @@ fn clean(soup: TriangleSoup, vertices: usize) -> Result<TriangleSoup, crate::mes
     };
     let (mesh, _) = prepare(soup, &options)?;
     let (vertices, faces) = mesh.into_parts();
-    Ok(TriangleSoup { vertices, faces })
+    Ok(TriangleSoup {
+        vertices,
+        faces,
+        ..TriangleSoup::default()
+    })
 }
 
 /// The groups of `--same`, every class of which must exist.

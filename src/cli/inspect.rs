@@ -113,6 +113,7 @@ fn inspect(
                 let prepared = TriangleSoup {
                     vertices: prepared.vertices().to_vec(),
                     faces: prepared.faces().to_vec(),
+                    ..TriangleSoup::default()
                 };
                 rows.push(GalleryRow {
                     label: pose.clone().unwrap_or_else(|| mesh.name.clone()),

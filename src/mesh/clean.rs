@@ -42,6 +42,7 @@ pub(super) fn clean(
     let TriangleSoup {
         mut vertices,
         mut faces,
+        ..
     } = soup;
     report.input_vertices = vertices.len();
     report.input_faces = faces.len();

@@ -84,6 +84,7 @@ pub fn read(bytes: &[u8], context: &ReadContext) -> Result<TriangleSoup, MeshErr
     let mut soup = TriangleSoup {
         vertices: Vec::with_capacity(vertices),
         faces: Vec::with_capacity(faces),
+        ..TriangleSoup::default()
     };
     for k in 0..vertices {
         let mut point = [0.0; 3];

@@ -15,6 +15,9 @@ pub struct TriangleSoup {
     pub vertices: Vec<[f64; 3]>,
     /// F × 3 vertex indices.
     pub faces: Vec<[u32; 3]>,
+    /// Step of the last written digit, in the units of the coordinates: two vertices that differ by less may have been
+    /// one. 0 where the coordinates are exact or where nothing tells.
+    pub resolution: f64,
 }
 
 impl TriangleSoup {

@@ -78,6 +78,7 @@ fn read_binary(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, MeshError>
     Ok(TriangleSoup {
         vertices: mesh.vertices.iter().map(|v| v.0.map(f64::from)).collect(),
         faces: mesh.faces.iter().map(|f| f.vertices.map(|k| k as u32)).collect(),
+        ..TriangleSoup::default()
     })
 }
 
@@ -174,7 +175,7 @@ mod tests {
             let theirs = stl_io::read_stl(&mut Cursor::new(text.as_bytes())).expect("well-formed");
             let vertices: Vec<_> = theirs.vertices.iter().map(|v| v.0.map(f64::from)).collect();
             let faces: Vec<_> = theirs.faces.iter().map(|f| f.vertices.map(|k| k as u32)).collect();
-            prop_assert_eq!(ours, TriangleSoup { vertices, faces });
+            prop_assert_eq!(ours, TriangleSoup { vertices, faces, ..TriangleSoup::default() });
         }
     }
 }

@@ -197,7 +197,11 @@ fn shuffled(mesh: TriangleSoup, rng: &mut ChaCha8Rng) -> TriangleSoup {
     }
     let mut faces: Vec<[u32; 3]> = mesh.faces.iter().map(|f| f.map(|v| order[v as usize])).collect();
     faces.shuffle(rng);
-    TriangleSoup { vertices, faces }
+    TriangleSoup {
+        vertices,
+        faces,
+        ..TriangleSoup::default()
+    }
 }
 
 /// Scales by a factor between 0.5 and 2, then moves by up to a unit along each axis.

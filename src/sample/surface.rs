@@ -40,6 +40,7 @@ pub fn polygonise(body: &Body, spacing: f64, offset: Vec3) -> TriangleSoup {
     TriangleSoup {
         vertices: grid.vertices,
         faces: grid.faces,
+        ..TriangleSoup::default()
     }
 }
 

@@ -176,7 +176,11 @@ fn a_triangle_soup_of_a_million_faces_is_welded_fast() {
 fn cleaning_twice_changes_nothing() {
     let (mesh, _) = prepare_full(awkward());
     let (vertices, faces) = mesh.clone().into_parts();
-    let (again, report) = prepare_full(TriangleSoup { vertices, faces });
+    let (again, report) = prepare_full(TriangleSoup {
+        vertices,
+        faces,
+        ..TriangleSoup::default()
+    });
     assert_eq!(again.faces(), mesh.faces());
     assert_eq!(
         report.welded_vertices + report.degenerate_faces + report.duplicate_faces,

@@ -11,6 +11,7 @@ fn soup(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> TriangleSoup {
     TriangleSoup {
         vertices: vertices.to_vec(),
         faces: faces.to_vec(),
+        ..TriangleSoup::default()
     }
 }
 
@@ -150,6 +151,7 @@ fn the_zoo_of_small_surfaces() {
     let mut hourglass = TriangleSoup {
         vertices: vec![[0.0; 3]],
         faces: Vec::new(),
+        ..TriangleSoup::default()
     };
     for z in [1.0, -1.0] {
         let first = hourglass.vertices.len() as u32;
@@ -249,7 +251,7 @@ proptest! {
             fill_holes_below,
             working_size,
         };
-        if let Ok((mesh, report)) = prepare(TriangleSoup { vertices, faces }, &options) {
+        if let Ok((mesh, report)) = prepare(TriangleSoup { vertices, faces, ..TriangleSoup::default() }, &options) {
             assert_prepared(&mesh, &report);
             if working_size > 0 {
                 prop_assert!(report.vertices <= working_size.max(8));

@@ -154,6 +154,7 @@ fn flat_shapes_are_whitened_in_their_plane() {
     let mut soup = TriangleSoup {
         vertices: vec![[0.0; 3]],
         faces: Vec::new(),
+        ..TriangleSoup::default()
     };
     let n = 60;
     for i in 0..n {

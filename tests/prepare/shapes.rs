@@ -108,7 +108,11 @@ pub fn icosphere(levels: usize) -> TriangleSoup {
         }
         faces = next;
     }
-    TriangleSoup { vertices, faces }
+    TriangleSoup {
+        vertices,
+        faces,
+        ..TriangleSoup::default()
+    }
 }
 
 /// A sphere by longitude and latitude: `rings` · `sectors` + 2 vertices.
@@ -133,7 +137,11 @@ pub fn globe(rings: u32, sectors: u32) -> TriangleSoup {
         }
         faces.push([last, at(rings - 1, j + 1), at(rings - 1, j)]);
     }
-    TriangleSoup { vertices, faces }
+    TriangleSoup {
+        vertices,
+        faces,
+        ..TriangleSoup::default()
+    }
 }
 
 /// A bumpy closed surface without symmetry, from [`icosphere`].
@@ -155,7 +163,11 @@ pub fn as_stl(soup: &TriangleSoup) -> TriangleSoup {
     let faces = (0..soup.faces.len() as u32)
         .map(|f| [3 * f, 3 * f + 1, 3 * f + 2])
         .collect();
-    TriangleSoup { vertices, faces }
+    TriangleSoup {
+        vertices,
+        faces,
+        ..TriangleSoup::default()
+    }
 }
 
 /// Default options without simplification.
@@ -194,6 +206,7 @@ pub fn shuffled(soup: &TriangleSoup, seed: u64) -> TriangleSoup {
             .into_iter()
             .map(|f| soup.faces[f].map(|v| to[v as usize]))
             .collect(),
+        ..TriangleSoup::default()
     }
 }
 
@@ -208,6 +221,7 @@ pub fn mapped(soup: &TriangleSoup, linear: [[f64; 3]; 3], offset: [f64; 3]) -> T
             })
             .collect(),
         faces: soup.faces.clone(),
+        ..TriangleSoup::default()
     }
 }
 

@@ -174,6 +174,7 @@ fn needles_and_random_faces_meet_the_size() {
     let mut star = TriangleSoup {
         vertices: vec![[0.0; 3]],
         faces: Vec::new(),
+        ..TriangleSoup::default()
     };
     let mut chain = star.clone();
     let mut last = 0;
@@ -192,6 +193,7 @@ fn needles_and_random_faces_meet_the_size() {
         faces: (0..3 * n)
             .map(|_| std::array::from_fn(|_| rng.random_range(0..n)))
             .collect(),
+        ..TriangleSoup::default()
     };
     for (name, soup) in [("star", star), ("chain", chain), ("random", random)] {
         for working_size in [5, 50, 1500] {
@@ -244,6 +246,7 @@ fn a_large_tangle_is_clustered_within_seconds() {
         faces: (0..2 * n)
             .map(|_| std::array::from_fn(|_| rng.random_range(0..n)))
             .collect(),
+        ..TriangleSoup::default()
     };
     let clock = Instant::now();
     let (mesh, report) = prepare(soup, &PrepareOptions::default()).unwrap();
@@ -274,6 +277,7 @@ fn a_large_ribbon_and_a_large_fan_are_simplified() {
             })
             .collect(),
         faces: (2..n).map(|i| [i - 2, i - 1, i]).collect(),
+        ..TriangleSoup::default()
     };
     let fan = TriangleSoup {
         vertices: (0..=n)
@@ -284,6 +288,7 @@ fn a_large_ribbon_and_a_large_fan_are_simplified() {
             })
             .collect(),
         faces: (1..=n).map(|i| [0, i, i % n + 1]).collect(),
+        ..TriangleSoup::default()
     };
     for (name, soup) in [("ribbon", ribbon), ("fan", fan)] {
         let (_, full) = prepare_full(soup.clone());

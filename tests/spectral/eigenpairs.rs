@@ -307,7 +307,11 @@ fn needles(seed: u64) -> TriangleSoup {
         let t = 10f64.powf(-rng.random_range(1.0..7.0));
         vertices[a] = std::array::from_fn(|c| vertices[b][c] + t * (vertices[a][c] - vertices[b][c]));
     }
-    TriangleSoup { vertices, faces }
+    TriangleSoup {
+        vertices,
+        faces,
+        ..TriangleSoup::default()
+    }
 }
 
 #[test]

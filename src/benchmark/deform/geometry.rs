@@ -123,5 +123,6 @@ pub fn keep_faces(mesh: &TriangleSoup, keep: impl Fn(&[u32; 3]) -> bool) -> Tria
     TriangleSoup {
         vertices: mesh.vertices.clone(),
         faces,
+        ..TriangleSoup::default()
     }
 }

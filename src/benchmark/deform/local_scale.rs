@@ -49,5 +49,6 @@ pub fn bulge(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> Triang
     TriangleSoup {
         vertices,
         faces: null.faces.clone(),
+        ..TriangleSoup::default()
     }
 }

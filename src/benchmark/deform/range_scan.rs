@@ -48,5 +48,9 @@ pub fn scan(null: &TriangleSoup, rng: &mut ChaCha8Rng) -> TriangleSoup {
             }
         }
     }
-    TriangleSoup { vertices, faces }
+    TriangleSoup {
+        vertices,
+        faces,
+        ..TriangleSoup::default()
+    }
 }

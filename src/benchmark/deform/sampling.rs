@@ -16,7 +16,11 @@ pub fn down_sample(null: &TriangleSoup, strength: u32) -> TriangleSoup {
     match prepare(null.clone(), &options) {
         Ok((mesh, _)) => {
             let (vertices, faces) = mesh.into_parts();
-            TriangleSoup { vertices, faces }
+            TriangleSoup {
+                vertices,
+                faces,
+                ..TriangleSoup::default()
+            }
         }
         Err(_) => null.clone(),
     }

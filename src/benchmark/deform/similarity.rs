@@ -23,5 +23,6 @@ pub fn similarity(mesh: &TriangleSoup, rng: &mut ChaCha8Rng) -> TriangleSoup {
     TriangleSoup {
         vertices: mesh.vertices.iter().map(place).collect(),
         faces: mesh.faces.clone(),
+        ..TriangleSoup::default()
     }
 }

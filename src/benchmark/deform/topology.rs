@@ -62,5 +62,9 @@ pub fn weld(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> Triangl
         .map(|f| f.map(|v| target[v as usize]))
         .filter(|f| f[0] != f[1] && f[1] != f[2] && f[2] != f[0])
         .collect();
-    TriangleSoup { vertices, faces }
+    TriangleSoup {
+        vertices,
+        faces,
+        ..TriangleSoup::default()
+    }
 }

@@ -32,6 +32,7 @@ pub fn affine(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> Trian
     TriangleSoup {
         vertices: null.vertices.iter().map(|p| map(&matrix, p)).collect(),
         faces: null.faces.clone(),
+        ..TriangleSoup::default()
     }
 }
 
@@ -41,6 +42,7 @@ pub fn scale(null: &TriangleSoup, strength: u32) -> TriangleSoup {
     TriangleSoup {
         vertices: null.vertices.iter().map(|p| p.map(|x| s * x)).collect(),
         faces: null.faces.clone(),
+        ..TriangleSoup::default()
     }
 }
 
@@ -60,6 +62,7 @@ pub fn noise(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> Triang
     TriangleSoup {
         vertices,
         faces: null.faces.clone(),
+        ..TriangleSoup::default()
     }
 }
 
@@ -83,5 +86,6 @@ pub fn shot_noise(null: &TriangleSoup, strength: u32, rng: &mut ChaCha8Rng) -> T
     TriangleSoup {
         vertices,
         faces: null.faces.clone(),
+        ..TriangleSoup::default()
     }
 }

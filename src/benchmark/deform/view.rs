@@ -34,6 +34,7 @@ pub fn visible(null: &TriangleSoup, _strength: u32, rng: &mut ChaCha8Rng) -> Tri
     TriangleSoup {
         vertices: null.vertices.clone(),
         faces,
+        ..TriangleSoup::default()
     }
 }
 
