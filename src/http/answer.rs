@@ -14,7 +14,6 @@ use crate::jobs::LiveIndex;
 use crate::mesh::TriangleSoup;
 use crate::model::ClassId;
 use crate::parameters::Parameters;
-use crate::pipeline::prepared::OPEN_ABOVE;
 use crate::pipeline::{Stage, StageSpan, describe_plain, describe_query, rank, rank_top};
 use crate::ranking::{Index, SIGNIFICANCE};
 use crate::spectral;
@@ -74,7 +73,7 @@ pub fn answer(
             };
             let (ranking, left) = ranked.map_err(|e| timely(e.into()))?;
             let mut ranked = Ranked::from(ranking);
-            if rank_by == parameters.rank_by && description.report.openness <= OPEN_ABOVE {
+            if rank_by == parameters.rank_by && !description.report.is_open() {
                 ranked.judge(live.calibration.as_ref());
             }
             (description, ranked, left)

@@ -1,6 +1,5 @@
 //! How well a class fits shapes of its own that it was learnt without: what confidence is calibrated by.
 
-use super::prepared::OPEN_ABOVE;
 use super::{Description, PipelineError, learn_model};
 use crate::cancel::Cancel;
 use crate::parameters::{Hypothesis, Parameters, RankBy};
@@ -29,7 +28,7 @@ pub fn held_out_scores(
         let (held, rest): (Vec<_>, Vec<_>) = shapes.iter().enumerate().partition(|(i, _)| i % folds == fold);
         let rest: Vec<&Description> = rest.into_iter().map(|(_, shape)| *shape).collect();
         let model = learn_model(&rest, parameters, cancel, &|_, _| ())?;
-        for (_, shape) in held.into_iter().filter(|(_, s)| s.report.openness <= OPEN_ABOVE) {
+        for (_, shape) in held.into_iter().filter(|(_, s)| !s.report.is_open()) {
             // A training shape's view on the fixed grid is there to be learnt from; as a query it would be open.
             let views: Vec<View> = shape
                 .views
