@@ -142,10 +142,10 @@ pub(super) fn boundary_loops<W: Watch>(
     let mut position = vec![usize::MAX; on.len()]; // where a vertex stands on the current path
     let mut loops = Vec::new();
     let mut steps = 0;
-    for start in 0..on.len() {
-        let mut path: Vec<usize> = vec![start]; // vertices
+    for first in 0..on.len() {
+        let mut path: Vec<usize> = vec![first]; // vertices
         let mut trail: Vec<usize> = Vec::new(); // edges between them
-        position[start] = 0;
+        position[first] = 0;
         while let Some(&at) = path.last() {
             watch.look(steps)?;
             steps += 1;

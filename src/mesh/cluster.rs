@@ -2,14 +2,10 @@
 
 use super::MeshError;
 use super::clean::Cleaned;
-use super::decimate::{adopt, single_precision};
-use super::grid::finest_grid;
+use super::grid::{COARSEST_GRID, FINEST_GRID, finest_grid};
+use super::library::{adopt, single_precision};
 use super::work::{Watch, Work};
 use meshopt::simplify_sloppy_decoder;
-
-/// Cells along the longest side of the grids that are tried; one cell keeps no face, the library's limit is 1025.
-pub(super) const COARSEST_GRID: usize = 2;
-pub(super) const FINEST_GRID: usize = 1000;
 
 /// A mesh is first brought to this many times the size on a grid of our own, so that the library's calls are short.
 const COARSE: usize = 16;

@@ -134,7 +134,10 @@ fn largest(
     let mut best = (first, [f64::INFINITY; 3]);
     for f in faces {
         let c = of_face(f);
-        for &v in f.iter().filter(|_| tied(c)) {
+        if !tied(c) {
+            continue;
+        }
+        for &v in f {
             if vertices[v as usize] < best.1 {
                 best = (c, vertices[v as usize]);
             }

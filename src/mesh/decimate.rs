@@ -1,8 +1,9 @@
 //! Simplification to the working size by quadric error (Garland and Heckbert 1997), with meshoptimizer.
 
-use super::clean::{Cleaned, clean_again, drop_unreferenced};
+use super::clean::{Cleaned, clean_again};
 use super::cluster::cluster;
 use super::edges::{EdgeCounts, count_edges};
+use super::library::{ANY_ERROR, COLLAPSE_BYTES, adopt, single_precision};
 use super::locality::order_along_curve;
 use super::orient::orient;
 use super::pieces::{Borders, PIECE, collapse_in_pieces};
@@ -36,12 +37,6 @@ const SMALLEST: usize = 8;
 /// Faces of a mesh that is collapsed as a whole although pieces of it could not be: more would take longer than some tens
 /// of milliseconds.
 const MOST_AS_A_WHOLE: usize = 8 * PIECE;
-
-/// Bytes that a call of the collapses takes for each vertex and for each face.
-pub(super) const COLLAPSE_BYTES: [usize; 2] = [150, 150];
-
-/// No bound on the error: the target is a size.
-pub(super) const ANY_ERROR: f32 = 1e3;
 
 /// Reduces a mesh to at most `working_size` vertices (less than 8 count as 8); 0 leaves it as it is. Near-linear in the
 /// number of faces. `edges` are those of the mesh.
@@ -187,15 +182,4 @@ fn collapse(
         faces_per_vertex = ((f - mesh.faces.len()) as f64 / removed as f64).clamp(1.0 / 3.0, 2.0);
     }
     Ok(())
-}
-
-/// Positions as the library takes them.
-pub(super) fn single_precision(vertices: &[[f64; 3]]) -> Vec<[f32; 3]> {
-    vertices.iter().map(|p| p.map(|x| x as f32)).collect()
-}
-
-/// Takes an index list over the mesh's own vertices as its faces.
-pub(super) fn adopt(mesh: &mut Cleaned, indices: &[u32], work: Work) -> Result<(), MeshError> {
-    mesh.faces = indices.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
-    drop_unreferenced(&mut mesh.vertices, &mut mesh.faces, work)
 }

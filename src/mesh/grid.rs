@@ -2,9 +2,12 @@
 
 use super::MeshError;
 use super::clean::{Cleaned, drop_unreferenced, duplicates};
-use super::cluster::{COARSEST_GRID, FINEST_GRID};
 use super::work::{Watch, Work};
 use std::collections::{HashMap, HashSet};
+
+/// Cells along the longest side of the grids that are tried; one cell keeps no face, the library's limit is 1025.
+pub(super) const COARSEST_GRID: usize = 2;
+pub(super) const FINEST_GRID: usize = 1000;
 
 /// A grid over [−1, 1]³.
 #[derive(Clone, Copy, Debug)]

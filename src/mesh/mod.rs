@@ -13,6 +13,7 @@ pub mod error;
 pub mod gltf;
 mod grid;
 pub mod holes;
+mod library;
 pub mod limits;
 mod locality;
 mod noise;

@@ -8,7 +8,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// Faces of a patch at most.
-const MOST_FACES: usize = 500_000;
+pub(super) const MOST_FACES: usize = 500_000;
 
 /// Bytes that a patch takes for each vertex and for each face.
 const BYTES: [usize; 2] = [110, 80];
@@ -322,8 +322,8 @@ impl<'a> Patch<'a> {
             .collect();
         // A face may become one that is there already only where both of its other corners are apexes.
         let folds = moved.iter().any(|(_, corners)| {
-            let others = corners.iter().filter(|v| **v != kept);
-            others.clone().all(|v| apexes.binary_search(v).is_ok())
+            let mut others = corners.iter().filter(|v| **v != kept);
+            others.all(|v| apexes.binary_search(v).is_ok())
                 && self.faces_of[kept as usize]
                     .iter()
                     .any(|g| self.faces[*g as usize].is_some_and(|g| sorted(g) == sorted(*corners)))

@@ -2,7 +2,7 @@
 
 use super::MeshError;
 use super::clean::{Cleaned, drop_unreferenced};
-use super::decimate::{ANY_ERROR, COLLAPSE_BYTES, single_precision};
+use super::library::{ANY_ERROR, COLLAPSE_BYTES, single_precision};
 use super::tangle::pairs;
 use super::work::{Watch, Work};
 use meshopt::{SimplifyOptions, simplify_decoder, simplify_with_locks_decoder};

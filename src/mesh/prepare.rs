@@ -65,8 +65,8 @@ pub fn prepare_within(
     if reduction.how != Simplified::No {
         report.simplified_from = Some(before);
     }
+    let scale = mesh.scale;
     let (mesh, census) = close_holes(mesh, options, &mut report, work)?;
-    let (mesh, scale) = mesh;
     let area = mesh.area();
     report.boundary_edges = census.boundary.len();
     report.openness = loops_length(mesh.vertices(), &census.boundary, &work)? / area.sqrt();
@@ -77,17 +77,17 @@ pub fn prepare_within(
     Ok((mesh.normalised()?, report))
 }
 
-/// The mesh with small holes closed and its scale, and the edges it has then.
+/// The mesh with small holes closed, and the edges it has then.
 fn close_holes(
     mesh: Cleaned,
     options: &PrepareOptions,
     report: &mut PrepareReport,
     work: Work,
-) -> Result<((TriMesh, f64), EdgeCensus), MeshError> {
+) -> Result<(TriMesh, EdgeCensus), MeshError> {
     let Cleaned {
         mut vertices,
         mut faces,
-        scale,
+        ..
     } = mesh;
     report.vertices = vertices.len();
     let mut census = edge_census_within(vertices.len(), &faces, work)?;
@@ -104,6 +104,5 @@ fn close_holes(
         census = edge_census_within(vertices.len(), &faces, work)?;
     }
     work.check()?;
-    let mesh = TriMesh::new(vertices, faces, report.vertices)?;
-    Ok(((mesh, scale), census))
+    Ok((TriMesh::new(vertices, faces, report.vertices)?, census))
 }

@@ -6,7 +6,7 @@
 //! is closed by merging the two ends of its shortest edge.
 
 use super::MeshError;
-use super::patch::{Outcome, Patch};
+use super::patch::{MOST_FACES, Outcome, Patch};
 use super::sliver::{Shape, shape};
 use super::trimesh::face_area;
 use super::work::{Watch, Work};
@@ -26,7 +26,8 @@ pub(super) struct Repaired {
     pub loose: usize,
 }
 
-/// Indices of the faces that are slivers; of none where they are the shape itself. Faces have three different vertices.
+/// Indices of the faces that are slivers; of none where there are too many to be taken out, or where they are the shape
+/// itself. Faces with a repeated vertex are not among them.
 pub(super) fn slivers(
     vertices: &[[f64; 3]],
     faces: &[[u32; 3]],
@@ -44,6 +45,9 @@ pub(super) fn slivers(
         if shape(vertices, f).0 != Shape::Sound {
             thin += area;
             found.push(i as u32);
+            if found.len() > MOST_FACES {
+                return Ok(Vec::new());
+            }
         }
     }
     if thin > MOST_AREA * total {

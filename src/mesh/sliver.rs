@@ -39,7 +39,11 @@ pub(super) fn shape(vertices: &[[f64; 3]], face: &[u32; 3]) -> (Shape, f64) {
     let p = corners.map(place);
     // Entry k is opposite corner k.
     let squares = [square(p[1], p[2]), square(p[0], p[2]), square(p[0], p[1])];
-    let opposite = |k: usize| [corners[(k + 1) % 3], corners[(k + 2) % 3]];
+    let opposite = |k: usize| match k {
+        0 => [corners[1], corners[2]],
+        1 => [corners[0], corners[2]],
+        _ => [corners[0], corners[1]],
+    };
     let (mut long, mut short) = (0, 0);
     for k in 1..3 {
         if squares[k] > squares[long] {

@@ -114,7 +114,7 @@ fn suspects(
     const LONGEST_RUN: usize = 256;
     // Open addressing, at most half full.
     let bits = (2 * vertices.len()).next_power_of_two().trailing_zeros().max(1);
-    let _held = (work.hold(vertices.len(), 8 + 1)?, work.hold(1 << bits, 4)?);
+    let _held = (work.hold(vertices.len(), 8 + 1 + 4)?, work.hold(1 << bits, 4)?);
     let mut suspect = vec![false; vertices.len()];
     let mut keys = Vec::with_capacity(vertices.len());
     for (i, (p, suspect)) in vertices.iter().zip(&mut suspect).enumerate() {
