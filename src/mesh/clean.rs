@@ -239,7 +239,11 @@ fn retain(
 }
 
 /// Flags every face whose three vertices an earlier face has already, in any order.
-pub(super) fn duplicates(vertex_count: usize, faces: &[[u32; 3]], work: Work) -> Result<Vec<bool>, MeshError> {
+pub(super) fn duplicates(
+    vertex_count: usize,
+    faces: &[[u32; 3]],
+    work: Work,
+) -> Result<Vec<bool>, MeshError> {
     let _held = (work.hold(vertex_count, 4)?, work.hold(faces.len(), 5)?);
     // Buckets by smallest vertex, in the order of the faces; each is compared by the other two. Counted two places up and
     // filled one place up, so that in the end `start[v]` is where the bucket of v starts.

@@ -68,7 +68,10 @@ pub(super) fn select(
     work: Work,
 ) -> Result<Selection, MeshError> {
     // There are at most as many components as faces, and no more than vertices.
-    let _held = (work.hold(vertices.len(), 8)?, work.hold(vertices.len().min(faces.len()), 17)?);
+    let _held = (
+        work.hold(vertices.len(), 8)?,
+        work.hold(vertices.len().min(faces.len()), 17)?,
+    );
     let mut sets = DisjointSets::new(vertices.len());
     for (i, f) in faces.iter().enumerate() {
         work.look(i)?;

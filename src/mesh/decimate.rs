@@ -129,8 +129,10 @@ fn reduce_in_pieces(
         return Ok(true);
     }
     // A ribbon is all border.
-    Ok(collapse_in_pieces(mesh, faces, options, Borders::Collapsed, work)?
-        || mesh.faces.len() <= MOST_AS_A_WHOLE)
+    Ok(
+        collapse_in_pieces(mesh, faces, options, Borders::Collapsed, work)?
+            || mesh.faces.len() <= MOST_AS_A_WHOLE,
+    )
 }
 
 /// Edge collapses until at most `size` vertices are left or no collapse is possible, or a hub makes them too slow.
@@ -139,12 +141,7 @@ fn reduce_in_pieces(
 /// single face, a face on its own has three vertices, and how many of each there will be is not known. So the first
 /// round, which does the work, aims a tenth above the size, and the later ones approach it with the measured faces per
 /// vertex.
-fn collapse(
-    mesh: &mut Cleaned,
-    size: usize,
-    options: SimplifyOptions,
-    work: Work,
-) -> Result<(), MeshError> {
+fn collapse(mesh: &mut Cleaned, size: usize, options: SimplifyOptions, work: Work) -> Result<(), MeshError> {
     let mut faces_per_vertex = 2.0;
     for round in 0..ROUNDS {
         let (v, f) = (mesh.vertices.len(), mesh.faces.len());
@@ -162,10 +159,7 @@ fn collapse(
         if pairs(v, mesh.faces.as_flattened()) > MOST_PAIRS {
             return Ok(());
         }
-        let _held = (
-            work.hold(v, COLLAPSE_BYTES[0])?,
-            work.hold(f, COLLAPSE_BYTES[1])?,
-        );
+        let _held = (work.hold(v, COLLAPSE_BYTES[0])?, work.hold(f, COLLAPSE_BYTES[1])?);
         let result = simplify_decoder(
             mesh.faces.as_flattened(),
             &single_precision(&mesh.vertices),

@@ -98,7 +98,9 @@ pub(super) fn for_each_edge<W: Watch>(
 /// Counts the edges of `faces` by kind; indices must be below `vertex_count`.
 pub fn edge_census(vertex_count: usize, faces: &[[u32; 3]]) -> EdgeCensus {
     let mut census = EdgeCensus::default();
-    let Ok(()) = for_each_edge(vertex_count, faces, &Unwatched, |a, b, group| census.add(a, b, group));
+    let Ok(()) = for_each_edge(vertex_count, faces, &Unwatched, |a, b, group| {
+        census.add(a, b, group)
+    });
     census
 }
 

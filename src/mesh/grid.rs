@@ -94,7 +94,8 @@ impl Grid {
             work.look(i)?;
             *f = f.map(|v| to[v as usize]);
         }
-        mesh.faces.retain(|f| f[0] != f[1] && f[1] != f[2] && f[2] != f[0]);
+        mesh.faces
+            .retain(|f| f[0] != f[1] && f[1] != f[2] && f[2] != f[0]);
         drop_unreferenced(&mut mesh.vertices, &mut mesh.faces, work)?;
         let duplicate = duplicates(mesh.vertices.len(), &mesh.faces, work)?;
         let mut i = 0;

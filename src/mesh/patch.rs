@@ -229,7 +229,9 @@ impl<'a> Patch<'a> {
 
     /// The vertex of a face that is neither `a` nor `b`.
     fn apex(&self, face: u32, a: u32, b: u32) -> Option<u32> {
-        self.faces[face as usize]?.into_iter().find(|v| *v != a && *v != b)
+        self.faces[face as usize]?
+            .into_iter()
+            .find(|v| *v != a && *v != b)
     }
 
     /// Makes the corner a vertex of all other faces at the base: each is split in two.

@@ -58,7 +58,10 @@ pub(super) fn collapse_in_pieces(
         // The pieces' results, and their union.
         let _held = (
             work.hold(before, 2 * 12)?,
-            work.hold(rayon::current_num_threads() * 2 * PIECE, COLLAPSE_BYTES[0] + COLLAPSE_BYTES[1])?,
+            work.hold(
+                rayon::current_num_threads() * 2 * PIECE,
+                COLLAPSE_BYTES[0] + COLLAPSE_BYTES[1],
+            )?,
         );
         let length = before.div_ceil(before / PIECE);
         let shared = match borders {

@@ -28,11 +28,7 @@ pub(super) struct Repaired {
 
 /// Indices of the faces that are slivers; of none where there are too many to be taken out, or where they are the shape
 /// itself. Faces with a repeated vertex are not among them.
-pub(super) fn slivers(
-    vertices: &[[f64; 3]],
-    faces: &[[u32; 3]],
-    work: Work,
-) -> Result<Vec<u32>, MeshError> {
+pub(super) fn slivers(vertices: &[[f64; 3]], faces: &[[u32; 3]], work: Work) -> Result<Vec<u32>, MeshError> {
     let mut found = Vec::new();
     let (mut thin, mut total) = (0.0, 0.0);
     for (i, f) in faces.iter().enumerate() {

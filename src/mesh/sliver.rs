@@ -22,57 +22,95 @@ pub(super) enum Shape {
 }
 
 /// The kind of a face with three different vertices, and the square of its longest edge.
-///
-/// The corners are taken in the order of their places, so that rounding does not depend on the order in the file.
 pub(super) fn shape(vertices: &[[f64; 3]], face: &[u32; 3]) -> (Shape, f64) {
+    /// Rounding is much less than this.
+    const CLEARLY: f64 = 2.0;
+    let measures = Measures::of(face.map(|v| vertices[v as usize]));
+    let (shortest, longest) = (measures.squares[measures.short], measures.squares[measures.long]);
+    let needle = shortest <= CLEARLY * NEEDLE * NEEDLE * longest;
+    let cap = measures.height <= CLEARLY * CAP * CAP * longest;
+    if needle || cap {
+        (thin_shape(vertices, face), longest)
+    } else {
+        (Shape::Sound, longest)
+    }
+}
+
+/// The kind of a face that may be a sliver. The corners are taken in the order of their places, so that rounding does not
+/// depend on the order in the file.
+fn thin_shape(vertices: &[[f64; 3]], face: &[u32; 3]) -> Shape {
     let place = |v: u32| vertices[v as usize];
     let mut corners = *face;
-    if place(corners[1]) < place(corners[0]) {
-        corners.swap(0, 1);
+    for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+        if place(corners[j]) < place(corners[i]) {
+            corners.swap(i, j);
+        }
     }
-    if place(corners[2]) < place(corners[1]) {
-        corners.swap(1, 2);
-    }
-    if place(corners[1]) < place(corners[0]) {
-        corners.swap(0, 1);
-    }
-    let p = corners.map(place);
-    // Entry k is opposite corner k.
-    let squares = [square(p[1], p[2]), square(p[0], p[2]), square(p[0], p[1])];
+    let Measures {
+        squares,
+        long,
+        short,
+        height,
+    } = Measures::of(corners.map(place));
     let opposite = |k: usize| match k {
         0 => [corners[1], corners[2]],
         1 => [corners[0], corners[2]],
         _ => [corners[0], corners[1]],
     };
-    let (mut long, mut short) = (0, 0);
-    for k in 1..3 {
-        if squares[k] > squares[long] {
-            long = k;
+    let (shortest, longest) = (squares[short], squares[long]);
+    let foot = shortest - height;
+    if shortest <= NEEDLE * NEEDLE * longest {
+        Shape::Needle {
+            edge: opposite(short),
         }
-        if squares[k] < squares[short] {
-            short = k;
-        }
-    }
-    let longest = squares[long];
-    if squares[short] <= NEEDLE * NEEDLE * longest {
-        return (Shape::Needle { edge: opposite(short) }, longest);
-    }
-    let [u, v] = [1, 2].map(|k: usize| [0, 1, 2].map(|i| p[k][i] - p[0][i]));
-    let cross = [
-        u[1] * v[2] - u[2] * v[1],
-        u[2] * v[0] - u[0] * v[2],
-        u[0] * v[1] - u[1] * v[0],
-    ];
-    let height = (cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]) / longest;
-    let foot = squares[short] - height;
-    if height <= CAP * CAP * longest && foot > OBTUSE * OBTUSE * height {
-        let cap = Shape::Cap {
+    } else if height <= CAP * CAP * longest && foot > OBTUSE * OBTUSE * height {
+        Shape::Cap {
             base: opposite(long),
             corner: corners[long],
-        };
-        return (cap, longest);
+        }
+    } else {
+        Shape::Sound
     }
-    (Shape::Sound, longest)
+}
+
+/// Squares of the lengths in a triangle.
+struct Measures {
+    /// Of the edges; entry k is opposite corner k.
+    squares: [f64; 3],
+    /// The longest and the shortest of them, the first where there are several.
+    long: usize,
+    short: usize,
+    /// Of the height on the longest edge.
+    height: f64,
+}
+
+impl Measures {
+    fn of(p: [[f64; 3]; 3]) -> Self {
+        let squares = [square(p[1], p[2]), square(p[0], p[2]), square(p[0], p[1])];
+        let (mut long, mut short) = (0, 0);
+        for k in 1..3 {
+            if squares[k] > squares[long] {
+                long = k;
+            }
+            if squares[k] < squares[short] {
+                short = k;
+            }
+        }
+        let u: [f64; 3] = std::array::from_fn(|i| p[1][i] - p[0][i]);
+        let v: [f64; 3] = std::array::from_fn(|i| p[2][i] - p[0][i]);
+        let cross = [
+            u[1] * v[2] - u[2] * v[1],
+            u[2] * v[0] - u[0] * v[2],
+            u[0] * v[1] - u[1] * v[0],
+        ];
+        let height = (cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]) / squares[long];
+        Self {
+            squares,
+            long,
+            short,
+            height,
+        }
+    }
 }
 
 fn square(a: [f64; 3], b: [f64; 3]) -> f64 {

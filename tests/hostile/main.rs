@@ -112,7 +112,11 @@ async fn large_surfaces(app: &App) {
             peak >> 20
         );
         if answer.status != expected || took > LIMIT || peak > MEMORY {
-            wrong.push(format!("{what}: {} in {took:?}, {} MB", answer.status, peak >> 20));
+            wrong.push(format!(
+                "{what}: {} in {took:?}, {} MB",
+                answer.status,
+                peak >> 20
+            ));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -123,7 +127,11 @@ fn processor_time() -> Duration {
     let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     // The name, in brackets, may hold anything; the 12th and 13th field after it are ticks of 10 ms.
     let fields = text.rsplit(')').next().unwrap_or_default().split_whitespace();
-    let ticks: u64 = fields.skip(11).take(2).filter_map(|t| t.parse::<u64>().ok()).sum();
+    let ticks: u64 = fields
+        .skip(11)
+        .take(2)
+        .filter_map(|t| t.parse::<u64>().ok())
+        .sum();
     Duration::from_millis(10 * ticks)
 }
 

@@ -171,7 +171,15 @@ pub const CASES: &[fn() -> Case] = &[
             "mesh_too_large",
         )
     },
-    || ("3000 triangles", "model/off", triangles(), 422, "disconnected_mesh"),
+    || {
+        (
+            "3000 triangles",
+            "model/off",
+            triangles(),
+            422,
+            "disconnected_mesh",
+        )
+    },
     || ("one place", "model/off", coincident(), 422, "degenerate_mesh"),
 ];
 

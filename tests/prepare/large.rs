@@ -173,7 +173,9 @@ const INPUTS: [(&str, Make); 9] = [
     ("fan", fan),
     ("book", book),
     ("ribbon", ribbon),
-    ("scrambled sphere", |n| scrambled((f64::from(n) / 2.0).sqrt() as u32)),
+    ("scrambled sphere", |n| {
+        scrambled((f64::from(n) / 2.0).sqrt() as u32)
+    }),
     ("loose faces", |n| loose((f64::from(n) / 2.0).sqrt() as u32)),
     ("points in a corner", |n| corner(n / 2)),
 ];
@@ -185,10 +187,8 @@ fn memory_is_reserved_before_it_is_taken() {
         pool.install(|| {
             let soup = make(300_000);
             let options = PrepareOptions::default();
-            let bound = 96 * soup.vertices.len()
-                + 64 * soup.faces.len()
-                + 1800 * options.working_size
-                + (32 << 20);
+            let bound =
+                96 * soup.vertices.len() + 64 * soup.faces.len() + 1800 * options.working_size + (32 << 20);
             let budget = MemoryBudget::new(bound as u64);
             let reservation = budget.reservation();
             let base = HELD.get();
@@ -220,7 +220,9 @@ fn what_is_not_granted_is_refused() {
 /// Nanoseconds a thread has run, by its folder in /proc; `None` where the system does not say.
 fn processor_time(thread: &std::path::Path) -> Option<Duration> {
     let text = std::fs::read_to_string(thread.join("schedstat")).ok()?;
-    Some(Duration::from_nanos(text.split_whitespace().next()?.parse().ok()?))
+    Some(Duration::from_nanos(
+        text.split_whitespace().next()?.parse().ok()?,
+    ))
 }
 
 #[test]
@@ -242,12 +244,16 @@ fn a_stop_is_noticed_within_50_ms() {
                 // One thread, so that its processor time is that of the work.
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
                 pool.install(|| {
-                    let thread = std::path::Path::new("/proc").join(std::fs::read_link("/proc/thread-self").unwrap());
+                    let thread =
+                        std::path::Path::new("/proc").join(std::fs::read_link("/proc/thread-self").unwrap());
                     let began = processor_time(&thread);
                     sender.send((thread.clone(), began)).unwrap();
                     let memory = MemoryBudget::unlimited().reservation();
                     let result = prepare_within(soup, &PrepareOptions::default(), &flag, &memory);
-                    (matches!(result, Err(MeshError::Cancelled(_))), processor_time(&thread))
+                    (
+                        matches!(result, Err(MeshError::Cancelled(_))),
+                        processor_time(&thread),
+                    )
                 })
             });
             let (thread, began) = receiver.recv().unwrap();
@@ -266,7 +272,10 @@ fn a_stop_is_noticed_within_50_ms() {
                 let took = to.saturating_sub(from);
                 eprintln!("{name}, {after} ms: {:.1} ms", took.as_secs_f64() * 1e3);
                 worst = worst.max(took);
-                assert!(took < Duration::from_millis(50), "{name} after {after} ms: {took:?}");
+                assert!(
+                    took < Duration::from_millis(50),
+                    "{name} after {after} ms: {took:?}"
+                );
             }
         }
     }

@@ -8,5 +8,5 @@ mod noise;
 mod real;
 mod refinement;
 mod shapes;
-mod slivers;
 mod simplification;
+mod slivers;

@@ -25,11 +25,21 @@ fn a_sphere_of_loose_triangles_closes() {
         let (mesh, report) = prepare_full(soup.clone());
         assert_prepared(&mesh, &report);
         let (_, exact) = prepare_full(sphere.clone());
-        assert_eq!((report.components_dropped, report.boundary_edges), (0, 0), "{report:?}");
-        assert_eq!((report.vertices, report.faces), (sphere.vertices.len(), sphere.faces.len()));
+        assert_eq!(
+            (report.components_dropped, report.boundary_edges),
+            (0, 0),
+            "{report:?}"
+        );
+        assert_eq!(
+            (report.vertices, report.faces),
+            (sphere.vertices.len(), sphere.faces.len())
+        );
         assert!((report.area / exact.area - 1.0).abs() < 1e-3);
         assert!(report.welded_within.is_some());
-        assert!(report.warnings.iter().any(|w| w.contains("last digits")), "{report:?}");
+        assert!(
+            report.warnings.iter().any(|w| w.contains("last digits")),
+            "{report:?}"
+        );
 
         // Without the step it falls to pieces, and says so.
         let loose = TriangleSoup {
@@ -37,7 +47,12 @@ fn a_sphere_of_loose_triangles_closes() {
             ..soup
         };
         let refused = prepare(loose, &PrepareOptions::default());
-        let Err(MeshError::Disconnected { parts, dropped, percent }) = refused else {
+        let Err(MeshError::Disconnected {
+            parts,
+            dropped,
+            percent,
+        }) = refused
+        else {
             panic!("{refused:?}");
         };
         assert!(parts > sphere.faces.len() / 2 && dropped == parts - 1 && percent > 90.0);
@@ -56,7 +71,10 @@ fn a_part_of_the_copies_may_differ() {
     }
     soup.resolution = 1e-6;
     let (_, report) = prepare_full(soup);
-    assert_eq!((report.boundary_edges, report.vertices), (0, sphere.vertices.len()));
+    assert_eq!(
+        (report.boundary_edges, report.vertices),
+        (0, sphere.vertices.len())
+    );
 }
 
 #[test]
@@ -74,7 +92,9 @@ fn close_sheets_and_small_details_stay_apart() {
         for i in 0..n - 1 {
             for j in 0..n - 1 {
                 let a = sheet * n * n + i * n + j;
-                sheets.faces.extend([[a, a + 1, a + n], [a + 1, a + n + 1, a + n]]);
+                sheets
+                    .faces
+                    .extend([[a, a + 1, a + n], [a + 1, a + n + 1, a + n]]);
             }
         }
     }
@@ -100,8 +120,11 @@ fn what_is_left_out_is_said() {
     let add = |soup: &mut TriangleSoup, k: i32| {
         let one = icosphere(3);
         let first = soup.vertices.len() as u32;
-        soup.vertices
-            .extend(one.vertices.iter().map(|p| [p[0] + 3.0 * f64::from(k), p[1], p[2]]));
+        soup.vertices.extend(
+            one.vertices
+                .iter()
+                .map(|p| [p[0] + 3.0 * f64::from(k), p[1], p[2]]),
+        );
         soup.faces.extend(one.faces.iter().map(|f| f.map(|v| v + first)));
     };
     for k in 0..5 {

@@ -21,7 +21,10 @@ fn spectrum(mesh: &TriMesh, count: usize) -> Vec<f64> {
 
 fn assert_same_spectrum(found: &[f64], expected: &[f64], tolerance: f64, what: &str) {
     for (x, y) in found.iter().zip(expected) {
-        assert!((x / y - 1.0).abs() < tolerance, "{what}: {found:?}, not {expected:?}");
+        assert!(
+            (x / y - 1.0).abs() < tolerance,
+            "{what}: {found:?}, not {expected:?}"
+        );
     }
 }
 
@@ -156,7 +159,11 @@ fn a_chain_of_vertices_on_one_edge_from_both_sides() {
         .position(|f| f.contains(&0) && f.contains(&1) && f.contains(&2))
         .unwrap();
     let along = (0..3)
-        .find(|k| [soup.faces[other][*k], soup.faces[other][(*k + 1) % 3]].iter().all(|v| *v < 2))
+        .find(|k| {
+            [soup.faces[other][*k], soup.faces[other][(*k + 1) % 3]]
+                .iter()
+                .all(|v| *v < 2)
+        })
         .unwrap();
     for k in 0..30 {
         put_on_edge(&mut soup, other, along, 0.93 - 0.001 * f64::from(k), [0.0; 3]);
@@ -205,7 +212,9 @@ fn a_needle_is_closed() {
     // A vertex of a sphere twice, a millionth of an edge apart, with two needles between.
     let mut soup = icosphere(2);
     let v = 40u32;
-    let around: Vec<usize> = (0..soup.faces.len()).filter(|f| soup.faces[*f].contains(&v)).collect();
+    let around: Vec<usize> = (0..soup.faces.len())
+        .filter(|f| soup.faces[*f].contains(&v))
+        .collect();
     let first = soup.faces[around[0]];
     let k = first.iter().position(|w| *w == v).unwrap();
     let (mut at, begin) = (first[(k + 1) % 3], first[(k + 1) % 3]);
@@ -227,7 +236,10 @@ fn a_needle_is_closed() {
     soup.faces.extend([[v, begin, copy], [v, copy, at]]);
     let (mesh, report) = prepare_full(soup);
     assert_closed(&mesh, &report, 2);
-    assert_eq!((report.repaired_faces, report.vertices, report.faces), (1, 162, 320));
+    assert_eq!(
+        (report.repaired_faces, report.vertices, report.faces),
+        (1, 162, 320)
+    );
 }
 
 #[test]
@@ -236,7 +248,13 @@ fn the_order_of_vertices_and_faces_does_not_matter() {
     let mut soup = bumpy(2);
     for _ in 0..60 {
         let face = rng.random_range(0..soup.faces.len());
-        put_on_edge(&mut soup, face, rng.random_range(0..3), rng.random_range(0.1..0.9), [1e-9; 3]);
+        put_on_edge(
+            &mut soup,
+            face,
+            rng.random_range(0..3),
+            rng.random_range(0.1..0.9),
+            [1e-9; 3],
+        );
     }
     let (mesh, report) = prepare_full(soup.clone());
     let reference = edge_lengths(&mesh);
@@ -295,7 +313,8 @@ fn ring(around: u32, across: u32) -> TriangleSoup {
                 f64::from(j) / f64::from(across) * tau,
             );
             let r = 2.0 + 0.7 * v.cos();
-            soup.vertices.push([r * u.cos(), r * u.sin(), 0.7 * v.sin() + 0.1 * u.cos()]);
+            soup.vertices
+                .push([r * u.cos(), r * u.sin(), 0.7 * v.sin() + 0.1 * u.cos()]);
         }
     }
     let at = |i: u32, j: u32| i % around * across + j % across;
