@@ -4,7 +4,6 @@
 use super::evaluate::LabelledShape;
 use crate::cancel::Cancel;
 use crate::parameters::Parameters;
-use crate::pipeline::prepared::OPEN_ABOVE;
 use crate::pipeline::{Description, HeldOutScores, PipelineError, held_out_scores, learn_model};
 use crate::ranking::{Calibration, Candidate, HeldOut, Index, IndexedClass, SIGNIFICANCE, Verdict, rank};
 use rand::SeedableRng;
@@ -138,7 +137,7 @@ pub fn evaluate_open_set(
         dealt.sort_unstable();
         train.insert(class, dealt);
     }
-    let judged = |i: &usize| shapes[*i].query.report.openness <= OPEN_ABOVE;
+    let judged = |i: &usize| !shapes[*i].query.report.is_open();
     let queried: Vec<usize> = members.values().flatten().copied().filter(judged).collect();
     let total = train.len() + queried.len();
     let done = std::sync::atomic::AtomicUsize::new(0);

@@ -169,9 +169,13 @@ impl Inspection {
             .simplified_from
             .map(|from| format!(", simplified from {from}"))
             .unwrap_or_default();
+        let refined = r
+            .refined_to
+            .map(|to| format!(", refined to {to} vertices"))
+            .unwrap_or_default();
         row(
             "prepared",
-            format!("{} vertices, {} faces{simplified}", r.vertices, r.faces),
+            format!("{} vertices, {} faces{simplified}{refined}", r.vertices, r.faces),
         );
         if let Some(to) = self.refined_to {
             row("refined", format!("to about {to} vertices for its spectrum"));
@@ -202,6 +206,7 @@ fn cleaned(r: &PrepareReport) -> String {
     let done: Vec<String> = [
         (r.welded_vertices, "vertices welded"),
         (r.degenerate_faces, "degenerate faces dropped"),
+        (r.repaired_faces, "faces without area repaired"),
         (r.duplicate_faces, "duplicate faces dropped"),
         (r.unreferenced_vertices, "unreferenced vertices dropped"),
         (r.components_dropped, "components dropped"),

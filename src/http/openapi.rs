@@ -355,6 +355,7 @@ const MESH: &[Code] = &[
     Code::NoFaces,
     Code::MeshTooSmall,
     Code::DegenerateMesh,
+    Code::DisconnectedMesh,
     Code::NotSimplified,
     Code::MeshTooLarge,
     Code::InvalidMesh,

@@ -80,6 +80,7 @@ codes! {
     NoFaces, "no_faces", 422, "The file has points but no faces";
     MeshTooSmall, "mesh_too_small", 422, "The mesh is too small to have a spectrum";
     DegenerateMesh, "degenerate_mesh", 422, "All faces are degenerate";
+    DisconnectedMesh, "disconnected_mesh", 422, "The mesh falls into parts of which too little would be kept";
     NotSimplified, "not_simplified", 422, "The mesh cannot be simplified to the working size";
     MeshTooLarge, "mesh_too_large", 413, "The mesh is larger than the limit";
     NoAnimation, "no_animation", 422, "Poses were asked of a file without animation";

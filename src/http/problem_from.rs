@@ -40,6 +40,14 @@ impl From<MeshError> for Problem {
                 .with("vertices", vertices)
                 .with("faces", faces),
             MeshError::Degenerate => of(Code::DegenerateMesh),
+            MeshError::Disconnected {
+                parts,
+                dropped,
+                percent,
+            } => of(Code::DisconnectedMesh)
+                .with("parts", parts)
+                .with("dropped", dropped)
+                .with("area_dropped", percent / 100.0),
             MeshError::NotSimplified { vertices, size } => of(Code::NotSimplified)
                 .with("vertices", vertices)
                 .with("size", size),

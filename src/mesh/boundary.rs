@@ -1,6 +1,7 @@
 //! The boundary of a surface: which vertices lie on it, and how much of it there is.
 
 use super::edges::edge_census;
+use super::work::{Unwatched, Watch};
 use super::{MeshError, TriMesh};
 
 /// Which vertices lie on the boundary: V flags, true for the ends of every edge with exactly one face.
@@ -23,16 +24,27 @@ pub fn boundary_vertices(mesh: &TriMesh) -> Vec<bool> {
 /// An edge of one face that is in no loop, as fins at non-manifold edges have them, bounds no part that is missing.
 pub fn openness(mesh: &TriMesh) -> f64 {
     let boundary = edge_census(mesh.vertices().len(), mesh.faces()).boundary;
-    loops_length(mesh.vertices(), &boundary) / mesh.area().sqrt()
+    let Ok(length) = loops_length(mesh.vertices(), &boundary, &Unwatched);
+    length / mesh.area().sqrt()
 }
 
+/// Bytes that finding the loops takes for each boundary edge.
+const LOOP_BYTES: usize = 100;
+
 /// Summed length of the loops that boundary edges form.
-pub(super) fn loops_length(vertices: &[[f64; 3]], boundary: &[[u32; 2]]) -> f64 {
-    let loops = boundary_loops(vertices, boundary);
+///
+/// # Errors
+/// Those of the watch.
+pub(super) fn loops_length<W: Watch>(
+    vertices: &[[f64; 3]],
+    boundary: &[[u32; 2]],
+    watch: &W,
+) -> Result<f64, W::Error> {
+    let loops = boundary_loops(vertices, boundary, watch)?;
     // Folded from +0, as an empty float sum is −0.
-    loops
+    Ok(loops
         .iter()
-        .fold(0.0, |length, edges| length + boundary_length(vertices, edges))
+        .fold(0.0, |length, edges| length + boundary_length(vertices, edges)))
 }
 
 /// The mesh with a smoother boundary: each vertex on it moves half-way to the mean of its neighbours along it. Faces,
@@ -73,7 +85,15 @@ pub fn smooth_boundary(mesh: TriMesh) -> Result<TriMesh, MeshError> {
 /// touch in a vertex, non-manifold spots) the walk takes the shortest edge first, and whenever it comes back to a
 /// vertex it has passed, the part since then is a loop of its own. A walk that ends nowhere is dropped. Choices go by
 /// place, never by index, so the order of vertices does not matter.
-pub(super) fn boundary_loops(vertices: &[[f64; 3]], boundary: &[[u32; 2]]) -> Vec<Vec<[u32; 2]>> {
+///
+/// # Errors
+/// Those of the watch.
+pub(super) fn boundary_loops<W: Watch>(
+    vertices: &[[f64; 3]],
+    boundary: &[[u32; 2]],
+    watch: &W,
+) -> Result<Vec<Vec<[u32; 2]>>, W::Error> {
+    let _held = watch.hold(boundary.len(), LOOP_BYTES)?;
     // Compact numbers of the vertices on the boundary, ordered by place.
     let mut on: Vec<u32> = boundary.iter().flatten().copied().collect();
     on.sort_unstable();
@@ -86,39 +106,60 @@ pub(super) fn boundary_loops(vertices: &[[f64; 3]], boundary: &[[u32; 2]]) -> Ve
             .unwrap_or(std::cmp::Ordering::Equal)
             .then(a.cmp(&b))
     });
-    let mut rank = vec![0usize; on.len()];
+    let mut rank = vec![0u32; on.len()];
     for (r, v) in on.iter().enumerate() {
-        rank[by_index.partition_point(|w| w < v)] = r;
+        rank[by_index.partition_point(|w| w < v)] = r as u32;
     }
     let rank_of = |v: u32| rank[by_index.partition_point(|w| *w < v)];
 
-    // For each vertex its edges, shortest last, as a walk pops from the end.
-    let mut edges_at: Vec<Vec<(f64, usize, usize)>> = vec![Vec::new(); on.len()]; // length, other end, edge
+    // The edges of each vertex, shortest last, as a walk takes from the end: length, other end, edge.
+    let mut start = vec![0u32; on.len() + 1];
+    for &v in boundary.iter().flatten() {
+        start[rank_of(v) as usize + 1] += 1;
+    }
+    for r in 0..on.len() {
+        start[r + 1] += start[r];
+    }
+    let mut end = start.clone();
+    let mut edges_at = vec![(0.0, 0u32, 0u32); 2 * boundary.len()];
     for (e, &[a, b]) in boundary.iter().enumerate() {
+        watch.look(e)?;
         let (ra, rb) = (rank_of(a), rank_of(b));
         let length = distance(&place(a), &place(b));
-        edges_at[ra].push((length, rb, e));
-        edges_at[rb].push((length, ra, e));
+        for (at, to) in [(ra, rb), (rb, ra)] {
+            let slot = &mut end[at as usize];
+            edges_at[*slot as usize] = (length, to, e as u32);
+            *slot += 1;
+        }
     }
-    for list in &mut edges_at {
+    for r in 0..on.len() {
+        watch.look(r)?;
+        let list = &mut edges_at[start[r] as usize..start[r + 1] as usize];
         list.sort_by(|x, y| y.0.total_cmp(&x.0).then(y.1.cmp(&x.1)));
     }
 
     let mut used = vec![false; boundary.len()];
     let mut position = vec![usize::MAX; on.len()]; // where a vertex stands on the current path
     let mut loops = Vec::new();
-    for start in 0..on.len() {
-        let mut path: Vec<usize> = vec![start]; // vertices
+    let mut steps = 0;
+    for first in 0..on.len() {
+        let mut path: Vec<usize> = vec![first]; // vertices
         let mut trail: Vec<usize> = Vec::new(); // edges between them
-        position[start] = 0;
+        position[first] = 0;
         while let Some(&at) = path.last() {
-            let Some((_, to, e)) = edges_at[at].pop() else {
+            watch.look(steps)?;
+            steps += 1;
+            let left = &mut end[at];
+            if *left == start[at] {
                 // A dead end: step back and leave the edge out.
                 position[at] = usize::MAX;
                 path.pop();
                 trail.pop();
                 continue;
-            };
+            }
+            *left -= 1;
+            let (_, to, e) = edges_at[*left as usize];
+            let (to, e) = (to as usize, e as usize);
             if used[e] {
                 continue;
             }
@@ -136,7 +177,7 @@ pub(super) fn boundary_loops(vertices: &[[f64; 3]], boundary: &[[u32; 2]]) -> Ve
             }
         }
     }
-    loops
+    Ok(loops)
 }
 
 /// Summed length of edges.

@@ -3,7 +3,8 @@
 //! Faces belong together when they share a vertex, not only an edge: that is what the Laplacian sees, whose null
 //! space has one dimension per such component.
 
-use super::prepare::Components;
+use super::work::{Watch, Work};
+use super::{Components, MeshError};
 
 /// Share of the area below which [`Components::All`] leaves a component out.
 pub const SMALLEST_SHARE: f64 = 0.01;
@@ -61,29 +62,36 @@ pub(super) struct Selection {
 /// smallest vertex, so that the order of the faces does not matter.
 pub(super) fn select(
     vertices: &[[f64; 3]],
-    faces: Vec<[u32; 3]>,
+    mut faces: Vec<[u32; 3]>,
     areas: &[f64],
     keep: Components,
-) -> Selection {
+    work: Work,
+) -> Result<Selection, MeshError> {
+    // There are at most as many components as faces, and no more than vertices.
+    let _held = (
+        work.hold(vertices.len(), 8)?,
+        work.hold(vertices.len().min(faces.len()), 17)?,
+    );
     let mut sets = DisjointSets::new(vertices.len());
-    for f in &faces {
+    for (i, f) in faces.iter().enumerate() {
+        work.look(i)?;
         sets.union(f[0], f[1]);
         sets.union(f[0], f[2]);
     }
     let mut number = vec![u32::MAX; vertices.len()];
     let mut component: Vec<f64> = Vec::new(); // areas
-    let mut of_face = Vec::with_capacity(faces.len());
-    for (f, area) in faces.iter().zip(areas) {
+    for (i, (f, area)) in faces.iter().zip(areas).enumerate() {
+        work.look(i)?;
         let slot = &mut number[sets.find(f[0]) as usize];
         if *slot == u32::MAX {
             *slot = component.len() as u32;
             component.push(0.0);
         }
         component[*slot as usize] += area;
-        of_face.push(*slot);
     }
+    let mut of_face = |f: &[u32; 3]| number[sets.find(f[0]) as usize] as usize;
     let total: f64 = component.iter().sum();
-    let largest = largest(vertices, &faces, &of_face, &component);
+    let largest = largest(vertices, &faces, &mut of_face, &component);
     let kept: Vec<bool> = component
         .iter()
         .enumerate()
@@ -96,17 +104,12 @@ pub(super) fn select(
         .map(|(area, _)| area))
     .sum();
     let dropped = kept.iter().filter(|k| !**k).count();
-    Selection {
-        faces: if dropped == 0 {
-            faces
-        } else {
-            (faces
-                .iter()
-                .zip(&of_face)
-                .filter(|(_, c)| kept[**c as usize])
-                .map(|(f, _)| *f))
-            .collect()
-        },
+    if dropped > 0 {
+        work.check()?;
+        faces.retain(|f| kept[of_face(f)]);
+    }
+    Ok(Selection {
+        faces,
         found: component.len(),
         dropped,
         area_dropped: if dropped == 0 || total <= 0.0 {
@@ -114,11 +117,16 @@ pub(super) fn select(
         } else {
             (1.0 - area_kept / total).clamp(0.0, 1.0)
         },
-    }
+    })
 }
 
 /// The component of the largest area; of several, the one with the smallest vertex.
-fn largest(vertices: &[[f64; 3]], faces: &[[u32; 3]], of_face: &[u32], areas: &[f64]) -> usize {
+fn largest(
+    vertices: &[[f64; 3]],
+    faces: &[[u32; 3]],
+    mut of_face: impl FnMut(&[u32; 3]) -> usize,
+    areas: &[f64],
+) -> usize {
     let most = areas.iter().copied().fold(0.0, f64::max);
     let tied = |c: usize| areas[c] >= most * (1.0 - AREA_TIE);
     let mut candidates = (0..areas.len()).filter(|&c| tied(c));
@@ -127,10 +135,14 @@ fn largest(vertices: &[[f64; 3]], faces: &[[u32; 3]], of_face: &[u32], areas: &[
         return first;
     }
     let mut best = (first, [f64::INFINITY; 3]);
-    for (f, &c) in faces.iter().zip(of_face).filter(|(_, c)| tied(**c as usize)) {
+    for f in faces {
+        let c = of_face(f);
+        if !tied(c) {
+            continue;
+        }
         for &v in f {
             if vertices[v as usize] < best.1 {
-                best = (c as usize, vertices[v as usize]);
+                best = (c, vertices[v as usize]);
             }
         }
     }
@@ -140,6 +152,17 @@ fn largest(vertices: &[[f64; 3]], faces: &[[u32; 3]], of_face: &[u32], areas: &[
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cancel::Cancel;
+    use crate::memory::MemoryBudget;
+
+    fn select(vertices: &[[f64; 3]], faces: Vec<[u32; 3]>, areas: &[f64], keep: Components) -> Selection {
+        let (cancel, memory) = (Cancel::new(), MemoryBudget::unlimited().reservation());
+        let work = Work {
+            cancel: &cancel,
+            memory: &memory,
+        };
+        super::select(vertices, faces, areas, keep, work).unwrap()
+    }
 
     fn triangle_at(vertices: &mut Vec<[f64; 3]>, x: f64, side: f64) -> [u32; 3] {
         let n = vertices.len() as u32;

@@ -1,5 +1,12 @@
 //! Undirected edges of a triangle list, sorted by how many faces meet there.
 
+use super::MeshError;
+use super::sort::sort;
+use super::work::{Unwatched, Watch, Work};
+
+/// Half-edges at one vertex from which on their sort is one that can be stopped.
+const LARGE_BUCKET: usize = 1 << 16;
+
 /// The edges where a triangle list is not an oriented surface without boundary.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EdgeCensus {
@@ -11,6 +18,22 @@ pub struct EdgeCensus {
     pub inconsistent: usize,
 }
 
+/// How many edges there are of each kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct EdgeCounts {
+    /// Edges in all.
+    pub edges: usize,
+    /// Edges with one face.
+    pub boundary: usize,
+    /// Edges with more than two faces.
+    pub non_manifold: usize,
+    /// Edges whose two faces run through them the same way.
+    pub inconsistent: usize,
+    /// Vertices at which more than two boundary edges meet, and edges with more than two faces: where the mesh is no
+    /// surface.
+    pub irregular: usize,
+}
+
 /// Half-edges grouped by edge: calls `visit(smaller, larger, group)` once per undirected edge, in ascending order.
 ///
 /// An entry of `group` is a half-edge `3 · face + corner` that runs from the corner to the next one, shifted left by
@@ -18,56 +41,120 @@ pub struct EdgeCensus {
 /// There are at most 2³² / 6 faces, far above what any reader takes.
 ///
 /// Half-edges are bucketed by the smaller index and each bucket is sorted, so the cost is linear for bounded degree
-/// and n log n at worst.
-pub(super) fn for_each_edge(
+/// and n log n at worst. It takes 4 bytes for each vertex and 24 for each face, 16 more where all faces are at one.
+///
+/// # Errors
+/// Those of the watch.
+pub(super) fn for_each_edge<W: Watch>(
     vertex_count: usize,
     faces: &[[u32; 3]],
+    watch: &W,
     mut visit: impl FnMut(u32, u32, &[u32]),
-) {
+) -> Result<(), W::Error> {
+    let _held = (watch.hold(vertex_count, 4)?, watch.hold(faces.len(), 24)?);
     debug_assert!(faces.len() <= (u32::MAX / 6) as usize);
-    let mut start = vec![0u32; vertex_count + 1];
-    for face in faces {
+    // Counted two places up and filled one place up, so that in the end `start[v]` is where the bucket of v starts.
+    let mut start = vec![0u32; vertex_count + 2];
+    for (f, face) in faces.iter().enumerate() {
+        watch.look(f)?;
         for k in 0..3 {
-            start[face[k].min(face[(k + 1) % 3]) as usize + 1] += 1;
+            start[face[k].min(face[(k + 1) % 3]) as usize + 2] += 1;
         }
     }
-    for v in 0..vertex_count {
+    for v in 1..=vertex_count {
         start[v + 1] += start[v];
     }
-    let mut next = start.clone();
     // The larger index above, the half-edge below: half the memory of a pair, and one comparison.
     let mut entries = vec![0u64; 3 * faces.len()];
     for (f, face) in faces.iter().enumerate() {
+        watch.look(f)?;
         for k in 0..3 {
             let (a, b) = (face[k], face[(k + 1) % 3]);
-            let slot = &mut next[a.min(b) as usize];
+            let slot = &mut start[a.min(b) as usize + 1];
             let half_edge = ((3 * f + k) as u32) << 1 | u32::from(a > b);
             entries[*slot as usize] = u64::from(a.max(b)) << 32 | u64::from(half_edge);
             *slot += 1;
         }
     }
-    drop(next);
     let mut group = Vec::new();
     for v in 0..vertex_count {
+        watch.look(v)?;
         let bucket = &mut entries[start[v] as usize..start[v + 1] as usize];
-        bucket.sort_unstable();
-        for run in bucket.chunk_by(|x, y| x >> 32 == y >> 32) {
+        if bucket.len() < LARGE_BUCKET {
+            bucket.sort_unstable();
+        } else {
+            sort(bucket, watch)?;
+        }
+        for (n, run) in bucket.chunk_by(|x, y| x >> 32 == y >> 32).enumerate() {
+            watch.look(n + 1)?;
             group.clear();
             group.extend(run.iter().map(|e| *e as u32));
             visit(v as u32, (run[0] >> 32) as u32, &group);
         }
     }
+    Ok(())
 }
 
 /// Counts the edges of `faces` by kind; indices must be below `vertex_count`.
 pub fn edge_census(vertex_count: usize, faces: &[[u32; 3]]) -> EdgeCensus {
     let mut census = EdgeCensus::default();
-    for_each_edge(vertex_count, faces, |a, b, group| match group {
-        [only] => census.boundary.push(if only & 1 == 0 { [a, b] } else { [b, a] }),
-        [x, y] => census.inconsistent += usize::from(x & 1 == y & 1),
-        _ => census.non_manifold += 1,
+    let Ok(()) = for_each_edge(vertex_count, faces, &Unwatched, |a, b, group| {
+        census.add(a, b, group)
     });
     census
+}
+
+/// As [`edge_census`], until it is stopped.
+pub(super) fn edge_census_within(
+    vertex_count: usize,
+    faces: &[[u32; 3]],
+    work: Work,
+) -> Result<EdgeCensus, MeshError> {
+    let mut census = EdgeCensus::default();
+    let mut boundary = 0;
+    for_each_edge(vertex_count, faces, &work, |_, _, group| {
+        boundary += usize::from(group.len() == 1);
+    })?;
+    let _boundary = work.hold(boundary, size_of::<[u32; 2]>())?;
+    census.boundary.reserve_exact(boundary);
+    for_each_edge(vertex_count, faces, &work, |a, b, group| census.add(a, b, group))?;
+    Ok(census)
+}
+
+/// Counts edges without a list of them.
+pub(super) fn count_edges(
+    vertex_count: usize,
+    faces: &[[u32; 3]],
+    work: Work,
+) -> Result<EdgeCounts, MeshError> {
+    let _held = work.hold(vertex_count, 1)?;
+    let mut counts = EdgeCounts::default();
+    let mut borders = vec![0u8; vertex_count];
+    for_each_edge(vertex_count, faces, &work, |a, b, group| {
+        counts.edges += 1;
+        match group {
+            [_] => {
+                counts.boundary += 1;
+                for v in [a, b] {
+                    borders[v as usize] = borders[v as usize].saturating_add(1);
+                }
+            }
+            [x, y] => counts.inconsistent += usize::from(x & 1 == y & 1),
+            _ => counts.non_manifold += 1,
+        }
+    })?;
+    counts.irregular = borders.iter().filter(|&&b| b > 2).count() + counts.non_manifold;
+    Ok(counts)
+}
+
+impl EdgeCensus {
+    fn add(&mut self, a: u32, b: u32, group: &[u32]) {
+        match group {
+            [only] => self.boundary.push(if only & 1 == 0 { [a, b] } else { [b, a] }),
+            [x, y] => self.inconsistent += usize::from(x & 1 == y & 1),
+            _ => self.non_manifold += 1,
+        }
+    }
 }
 
 #[cfg(test)]

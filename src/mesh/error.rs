@@ -56,6 +56,15 @@ pub enum MeshError {
     /// All faces have zero area.
     #[error("every face is degenerate (zero area or repeated vertices)")]
     Degenerate,
+    /// The mesh falls into pieces of which only a small part would be kept.
+    #[error(
+        "the mesh is not connected: {dropped} of {parts} separate parts, {percent:.0} % of the surface, would be left out; connect the parts (weld their vertices), or set components to all, which keeps those of at least 1 % of it"
+    )]
+    Disconnected {
+        parts: usize,
+        dropped: usize,
+        percent: f64,
+    },
     /// Simplification to the working size would leave no face with an area.
     #[error(
         "the mesh cannot be simplified from {vertices} to {size} vertices, as too many of its faces are thin or apart; raise working_size or set it to 0"

@@ -1,7 +1,9 @@
 //! Closing small boundary loops.
 
+use super::MeshError;
 use super::boundary::{boundary_length, boundary_loops};
 use super::trimesh::face_area;
+use super::work::{Watch, Work};
 
 /// A fan face below this share of the total area is not added, as the cleaning would drop it.
 const NO_AREA: f64 = 1e-12;
@@ -13,22 +15,27 @@ const NO_AREA: f64 = 1e-12;
 /// Fan faces run against their neighbours' direction, as on a consistently oriented surface. A loop whose whole fan
 /// has no area (a slit) stays, and so do all where there are more loops than vertices: in a tangle of faces they bound
 /// no holes, and their centres would be most of the mesh.
+///
+/// # Errors
+/// [`MeshError::Cancelled`], [`MeshError::Memory`].
 pub(super) fn fill_small_holes(
     vertices: &mut Vec<[f64; 3]>,
     faces: &mut Vec<[u32; 3]>,
     boundary: &[[u32; 2]],
     below: f64,
-) -> usize {
+    work: Work,
+) -> Result<usize, MeshError> {
     if below.is_nan() || below <= 0.0 {
-        return 0;
+        return Ok(0);
     }
     let area: f64 = faces.iter().map(|f| face_area(vertices, f)).sum();
     let mut filled = 0;
-    let loops = boundary_loops(vertices, boundary);
+    let loops = boundary_loops(vertices, boundary, &work)?;
     if loops.len() > vertices.len() {
-        return 0;
+        return Ok(0);
     }
-    for edges in loops {
+    for (i, edges) in loops.into_iter().enumerate() {
+        work.look(i)?;
         if boundary_length(vertices, &edges) >= below * area.sqrt() {
             continue;
         }
@@ -54,17 +61,25 @@ pub(super) fn fill_small_holes(
             filled += 1;
         }
     }
-    filled
+    Ok(filled)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::edges::edge_census;
+    use super::super::work::Unwatched;
     use super::*;
+    use crate::cancel::Cancel;
+    use crate::memory::MemoryBudget;
 
     fn fill(vertices: &mut Vec<[f64; 3]>, faces: &mut Vec<[u32; 3]>, below: f64) -> usize {
         let boundary = edge_census(vertices.len(), faces).boundary;
-        fill_small_holes(vertices, faces, &boundary, below)
+        let (cancel, memory) = (Cancel::new(), MemoryBudget::unlimited().reservation());
+        let work = Work {
+            cancel: &cancel,
+            memory: &memory,
+        };
+        fill_small_holes(vertices, faces, &boundary, below, work).unwrap()
     }
 
     /// A flat n × n grid of unit squares, two triangles each.
@@ -139,7 +154,7 @@ mod tests {
             .map(|i| [f64::from(i), f64::from(i * i % 5), 0.0])
             .collect();
         let edges = [[0, 1], [1, 2], [2, 3], [3, 0], [3, 4], [4, 5], [6, 4]];
-        let loops = boundary_loops(&vertices, &edges);
+        let Ok(loops) = boundary_loops(&vertices, &edges, &Unwatched);
         assert_eq!(loops.len(), 1);
         let mut found = loops[0].clone();
         found.sort_unstable();

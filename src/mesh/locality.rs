@@ -1,5 +1,9 @@
 //! An order of vertices and faces in which neighbours on the surface are neighbours in memory.
 
+use super::MeshError;
+use super::sort::sort;
+use super::work::{Watch, Work};
+
 /// Bits per axis of the curve: cells of a thousandth of the mesh hold a handful of a million vertices.
 const BITS: u32 = 10;
 
@@ -8,7 +12,21 @@ const BITS: u32 = 10;
 ///
 /// A file may list its faces in any order; a million of them taken at random miss the cache at every step. One sort
 /// of the vertices and a linear pass over the faces.
-pub(super) fn order_along_curve(vertices: &mut Vec<[f64; 3]>, faces: &mut Vec<[u32; 3]>) {
+///
+/// # Errors
+/// [`MeshError::Cancelled`], [`MeshError::Memory`].
+pub(super) fn order_along_curve(
+    vertices: &mut Vec<[f64; 3]>,
+    faces: &mut Vec<[u32; 3]>,
+    work: Work,
+) -> Result<(), MeshError> {
+    let place = order_vertices(vertices, work)?;
+    order_faces(&place, faces, work)
+}
+
+/// Orders the vertices and returns the new index of each.
+fn order_vertices(vertices: &mut Vec<[f64; 3]>, work: Work) -> Result<Vec<u32>, MeshError> {
+    let _held = work.hold(vertices.len(), 8 + 4 + 24)?;
     let cells = f64::from(1u32 << BITS);
     let mut order: Vec<u64> = vertices
         .iter()
@@ -21,31 +39,40 @@ pub(super) fn order_along_curve(vertices: &mut Vec<[f64; 3]>, faces: &mut Vec<[u
             u64::from(key) << 32 | i as u64
         })
         .collect();
-    order.sort_unstable();
+    sort(&mut order, &work)?;
     let mut place = vec![0u32; vertices.len()];
     let mut moved = Vec::with_capacity(vertices.len());
     for (new, key) in order.iter().enumerate() {
+        work.look(new)?;
         let old = (key & 0xffff_ffff) as usize;
         place[old] = new as u32;
         moved.push(vertices[old]);
     }
     *vertices = moved;
+    Ok(place)
+}
 
-    let mut start = vec![0u32; vertices.len() + 1];
-    for f in faces.iter_mut() {
+/// Renumbers the corners by `place` and orders the faces by their smallest.
+fn order_faces(place: &[u32], faces: &mut Vec<[u32; 3]>, work: Work) -> Result<(), MeshError> {
+    let _held = (work.hold(place.len(), 8)?, work.hold(faces.len(), 12)?);
+    let mut start = vec![0u32; place.len() + 1];
+    for (i, f) in faces.iter_mut().enumerate() {
+        work.look(i)?;
         *f = f.map(|v| place[v as usize]);
         start[f[0].min(f[1]).min(f[2]) as usize + 1] += 1;
     }
-    for v in 0..vertices.len() {
+    for v in 0..place.len() {
         start[v + 1] += start[v];
     }
     let mut moved = vec![[0; 3]; faces.len()];
-    for f in faces.iter() {
+    for (i, f) in faces.iter().enumerate() {
+        work.look(i)?;
         let slot = &mut start[f[0].min(f[1]).min(f[2]) as usize];
         moved[*slot as usize] = *f;
         *slot += 1;
     }
     *faces = moved;
+    Ok(())
 }
 
 /// The lowest ten bits, each followed by two zeros.
@@ -59,6 +86,8 @@ fn spread(x: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cancel::Cancel;
+    use crate::memory::MemoryBudget;
 
     #[test]
     fn bits_are_spread() {
@@ -98,7 +127,12 @@ mod tests {
             far.sum::<u64>() / faces.len() as u64
         };
         let before = (corners(&vertices, &faces), reach(&faces));
-        order_along_curve(&mut vertices, &mut faces);
+        let (cancel, memory) = (Cancel::new(), MemoryBudget::unlimited().reservation());
+        let work = Work {
+            cancel: &cancel,
+            memory: &memory,
+        };
+        order_along_curve(&mut vertices, &mut faces, work).unwrap();
         assert_eq!(corners(&vertices, &faces), before.0);
         assert!(reach(&faces) * 5 < before.1, "{} {}", reach(&faces), before.1);
         assert!(faces.is_sorted_by_key(|f| f.iter().min().copied()));

@@ -1,51 +1,79 @@
 //! Making neighbouring faces run the same way round.
 
+use super::MeshError;
 use super::edges::for_each_edge;
+use super::work::{Watch, Work};
 
 /// Reverses faces until neighbours across every edge of two faces agree, as far as the surface can be oriented.
 ///
 /// Nothing spectral depends on orientation, but simplification does: it takes an edge whose faces disagree for a
 /// boundary. Faces keep their order; the first of each edge-connected part keeps its direction. On a surface that
 /// cannot be oriented (a Moebius strip) a line of disagreement is left. Linear.
-pub(super) fn orient(vertex_count: usize, faces: &mut [[u32; 3]]) {
+///
+/// # Errors
+/// [`MeshError::Cancelled`], [`MeshError::Memory`].
+pub(super) fn orient(vertex_count: usize, faces: &mut [[u32; 3]], work: Work) -> Result<(), MeshError> {
     const NONE: u32 = u32::MAX;
-    // The face across each half-edge, and whether the two run the same way there, which is a disagreement.
-    let mut across = vec![(NONE, false); 3 * faces.len()];
-    for_each_edge(vertex_count, faces, |_, _, group| {
+    const REVERSED: u8 = 1;
+    const SEEN: u8 = 2;
+    let _across = work.hold(faces.len(), 3 * size_of::<u32>())?;
+    // The face across each half-edge, doubled, and one more where the two run the same way there, a disagreement.
+    let mut across = vec![NONE; 3 * faces.len()];
+    for_each_edge(vertex_count, faces, &work, |_, _, group| {
         if let [x, y] = *group {
-            let same = x & 1 == y & 1;
-            across[(x >> 1) as usize] = ((y >> 1) / 3, same);
-            across[(y >> 1) as usize] = ((x >> 1) / 3, same);
+            let same = u32::from(x & 1 == y & 1);
+            across[(x >> 1) as usize] = (y >> 1) / 3 * 2 + same;
+            across[(y >> 1) as usize] = (x >> 1) / 3 * 2 + same;
         }
-    });
-    let mut reversed: Vec<Option<bool>> = vec![None; faces.len()];
-    let mut stack = Vec::new();
+    })?;
+    // A stack that grows by doubling holds up to three times its length for a moment.
+    let _walk = work.hold(faces.len(), 1 + 3 * size_of::<u32>())?;
+    let mut state = vec![0u8; faces.len()];
+    let mut stack: Vec<u32> = Vec::new();
+    let mut steps = 0;
     for seed in 0..faces.len() {
-        if reversed[seed].is_some() {
+        if state[seed] != 0 {
             continue;
         }
-        reversed[seed] = Some(false);
-        stack.push((seed, false));
-        while let Some((f, flip)) = stack.pop() {
-            for &(g, same) in &across[3 * f..3 * f + 3] {
-                if g != NONE && reversed[g as usize].is_none() {
-                    reversed[g as usize] = Some(flip ^ same);
-                    stack.push((g as usize, flip ^ same));
+        state[seed] = SEEN;
+        stack.push(seed as u32);
+        while let Some(f) = stack.pop() {
+            work.look(steps)?;
+            steps += 1;
+            let f = f as usize;
+            for &entry in &across[3 * f..3 * f + 3] {
+                let g = (entry >> 1) as usize;
+                if entry != NONE && state[g] == 0 {
+                    state[g] = SEEN | (state[f] & REVERSED) ^ (entry & 1) as u8;
+                    stack.push(g as u32);
                 }
             }
         }
     }
-    for (f, flip) in faces.iter_mut().zip(reversed) {
-        if flip == Some(true) {
+    for (f, state) in faces.iter_mut().zip(state) {
+        if state & REVERSED != 0 {
             f.swap(1, 2);
         }
     }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::edges::edge_census;
     use super::*;
+    use crate::cancel::Cancel;
+    use crate::memory::MemoryBudget;
+
+    fn orient(vertex_count: usize, faces: &mut [[u32; 3]]) {
+        let memory = MemoryBudget::unlimited().reservation();
+        let cancel = Cancel::new();
+        let work = Work {
+            cancel: &cancel,
+            memory: &memory,
+        };
+        super::orient(vertex_count, faces, work).unwrap();
+    }
 
     #[test]
     fn a_shuffled_octahedron_is_oriented_again() {

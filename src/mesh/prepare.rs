@@ -2,115 +2,31 @@
 
 use super::boundary::loops_length;
 use super::clean::{Cleaned, clean};
-use super::decimate::{Simplified, simplify_to};
-use super::edges::edge_census;
+use super::decimate::simplify_to;
+use super::edges::{EdgeCensus, count_edges, edge_census_within};
 use super::holes::fill_small_holes;
-use super::{MeshError, TriMesh, TriangleSoup};
+use super::report::Simplified;
+use super::work::{Watch, Work};
+use super::{MeshError, PrepareOptions, PrepareReport, TriMesh, TriangleSoup};
 use crate::cancel::Cancel;
-use serde::{Deserialize, Serialize};
-
-/// Boundary length / √area above which a surface counts as open (a half sphere has 2.507).
-pub const OPEN: f64 = 2.5;
-
-/// Fewer vertices than this describe a shape poorly.
-const FEW_VERTICES: usize = 300;
-
-/// More separate parts than this are worth a warning.
-const MANY_COMPONENTS: usize = 10;
-
-/// Which connected components are kept.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Components {
-    /// The one with the largest area.
-    #[default]
-    Largest,
-    /// All with at least 1 % of the area.
-    All,
-}
-
-/// How a soup becomes a mesh (method, step 1).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct PrepareOptions {
-    /// Which connected components are kept.
-    pub components: Components,
-    /// Close boundary loops with a perimeter below this many times √area; 0 closes none.
-    pub fill_holes_below: f64,
-    /// Simplify meshes with more vertices than this, or than 8; 0 never does.
-    pub working_size: usize,
-}
-
-impl Default for PrepareOptions {
-    /// Largest component, holes below 1.2 √area closed, 2000 vertices.
-    fn default() -> Self {
-        Self {
-            components: Components::Largest,
-            fill_holes_below: 1.2,
-            working_size: 2000,
-        }
-    }
-}
-
-/// What preparing did to a mesh.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct PrepareReport {
-    /// Vertices as read.
-    pub input_vertices: usize,
-    /// Faces as read.
-    pub input_faces: usize,
-    /// Vertices merged into a coincident one.
-    pub welded_vertices: usize,
-    /// Faces dropped for a repeated vertex or (nearly) no area.
-    pub degenerate_faces: usize,
-    /// Faces dropped because the same three vertices have one already.
-    pub duplicate_faces: usize,
-    /// Vertices dropped because no face uses them, or only dropped faces did.
-    pub unreferenced_vertices: usize,
-    /// Connected components (faces that share a vertex) after cleaning.
-    pub components: usize,
-    /// Components left out.
-    pub components_dropped: usize,
-    /// Share of the total area that was left out, 0 to 1.
-    pub area_dropped: f64,
-    /// Edges with more than two faces, before simplification.
-    pub non_manifold_edges: usize,
-    /// Edges with one face, after small holes were closed.
-    pub boundary_edges: usize,
-    /// Boundary loops closed by a fan.
-    pub holes_filled: usize,
-    /// Vertices before simplification, where the mesh was simplified.
-    pub simplified_from: Option<usize>,
-    /// Vertices that carry signatures, before a coarse mesh is refined.
-    pub vertices: usize,
-    /// Faces of the prepared mesh.
-    pub faces: usize,
-    /// Surface area of the prepared mesh before normalisation, in the file's squared units.
-    pub area: f64,
-    /// Length of the boundary's loops / √area after small holes were closed: 0 for a closed surface, 8–16 for a single
-    /// view.
-    pub openness: f64,
-    /// Things a user should know, one sentence each.
-    pub warnings: Vec<String>,
-}
+use crate::memory::{MemoryBudget, Reservation};
 
 /// Cleans, simplifies and closes small holes; the result has unit area and its area centroid at the origin.
 ///
-/// In this order: [cleaning](super::clean) (weld, degenerate and duplicate faces, unused vertices, components),
-/// [simplification](super::decimate) above the working size, [small holes](super::holes), scale and place. Vertices
-/// added to holes come last and carry no signatures. The outcome does not depend on the position, size or units of
-/// the input, nor, up to order and unless the mesh is simplified, on the order of its vertices and faces.
+/// In this order: [cleaning](super::clean) (weld, slivers, degenerate and duplicate faces, unused vertices,
+/// components), [simplification](super::decimate) above the working size, [small holes](super::holes), scale and place.
+/// Vertices added to holes come last and carry no signatures. The outcome does not depend on the position, size or units
+/// of the input, nor, up to order and unless the mesh is simplified, on the order of its vertices and faces.
 ///
 /// Errors: [`MeshError::NoFaces`] for points only, [`MeshError::NotFinite`] and [`MeshError::IndexOutOfRange`] for
-/// soups that break their promise, [`MeshError::Degenerate`] when no face has an area, [`MeshError::TooSmall`] when
-/// fewer than 4 vertices or 2 faces are left, [`MeshError::NotSimplified`] when the working size would leave nothing.
+/// soups that break their promise, [`MeshError::Degenerate`] when no face has an area, [`MeshError::Disconnected`]
+/// when more than 90 % of the area would be left out, [`MeshError::TooSmall`] when fewer than 4 vertices or 2 faces are
+/// left, [`MeshError::NotSimplified`] when the working size would leave nothing.
 pub fn prepare(soup: TriangleSoup, options: &PrepareOptions) -> Result<(TriMesh, PrepareReport), MeshError> {
     prepare_until(soup, options, &Cancel::new())
 }
 
-/// As [`prepare`], for a caller that may ask to stop. The flag is looked at between the steps; large meshes are
-/// simplified in pieces, and between these, too.
+/// As [`prepare`], for a caller that may ask to stop and does not limit the memory.
 ///
 /// Errors: those of [`prepare`], and [`MeshError::Cancelled`].
 pub fn prepare_until(
@@ -118,119 +34,75 @@ pub fn prepare_until(
     options: &PrepareOptions,
     cancel: &Cancel,
 ) -> Result<(TriMesh, PrepareReport), MeshError> {
+    prepare_within(soup, options, cancel, &MemoryBudget::unlimited().reservation())
+}
+
+/// As [`prepare`], for a caller that may ask to stop and that grants memory.
+///
+/// The flag is looked at every few milliseconds. The exception are meshes that are simplified to more than some 8000
+/// vertices: the last collapses are one call for up to 8 faces per vertex of the working size, some 1 µs each.
+///
+/// Before arrays are allocated their bytes are reserved in `memory`, and given back when they are freed; after the call
+/// it holds what it held before. For V vertices and F faces of the soup and a working size of W at most
+/// 96 V + 64 F + 1800 W bytes and 32 MiB are reserved at a time, and 110 bytes for each boundary edge of a mesh that
+/// is not simplified. The soup's own 24 V + 12 F bytes are the caller's, who has reserved them when it was read.
+///
+/// Errors: those of [`prepare`], [`MeshError::Cancelled`] and [`MeshError::Memory`].
+pub fn prepare_within(
+    soup: TriangleSoup,
+    options: &PrepareOptions,
+    cancel: &Cancel,
+    memory: &Reservation,
+) -> Result<(TriMesh, PrepareReport), MeshError> {
+    let work = Work { cancel, memory };
     let mut report = PrepareReport::default();
-    let mut mesh = clean(soup, options.components, &mut report, cancel)?;
-    cancel.check()?;
-    let mut census = edge_census(mesh.vertices.len(), &mesh.faces);
-    report.non_manifold_edges = census.non_manifold;
-
+    let mut mesh = clean(soup, options.components, &mut report, work)?;
+    report.check_kept()?;
     let before = mesh.vertices.len();
-    let oriented = census.inconsistent == 0;
-    let simplified = simplify_to(
-        &mut mesh,
-        options.working_size,
-        options.components,
-        oriented,
-        cancel,
-    )?;
-    if simplified != Simplified::No {
+    let edges = count_edges(before, &mesh.faces, work)?;
+    report.non_manifold_edges = edges.non_manifold;
+    let reduction = simplify_to(&mut mesh, options, &edges, work)?;
+    if reduction.how != Simplified::No {
         report.simplified_from = Some(before);
-        census = edge_census(mesh.vertices.len(), &mesh.faces);
     }
+    let scale = mesh.scale;
+    let (mesh, census) = close_holes(mesh, options, &mut report, work)?;
+    let area = mesh.area();
+    report.boundary_edges = census.boundary.len();
+    report.openness = loops_length(mesh.vertices(), &census.boundary, &work)? / area.sqrt();
+    // Clamped, as the squared units of a finite file may overflow and reports are written as JSON.
+    report.area = (area * scale * scale).min(f64::MAX);
+    report.warn(reduction.how, reduction.torn_off);
+    work.check()?;
+    Ok((mesh.normalised()?, report))
+}
 
+/// The mesh with small holes closed, and the edges it has then.
+fn close_holes(
+    mesh: Cleaned,
+    options: &PrepareOptions,
+    report: &mut PrepareReport,
+    work: Work,
+) -> Result<(TriMesh, EdgeCensus), MeshError> {
     let Cleaned {
         mut vertices,
         mut faces,
-        scale,
+        ..
     } = mesh;
     report.vertices = vertices.len();
+    let mut census = edge_census_within(vertices.len(), &faces, work)?;
+    let _list = work.hold(census.boundary.len(), size_of::<[u32; 2]>())?;
     report.holes_filled = fill_small_holes(
         &mut vertices,
         &mut faces,
         &census.boundary,
         options.fill_holes_below,
-    );
+        work,
+    )?;
     report.faces = faces.len();
     if report.holes_filled > 0 {
-        census = edge_census(vertices.len(), &faces);
+        census = edge_census_within(vertices.len(), &faces, work)?;
     }
-    let mesh = TriMesh::new(vertices, faces, report.vertices)?;
-    let area = mesh.area();
-    report.boundary_edges = census.boundary.len();
-    report.openness = loops_length(mesh.vertices(), &census.boundary) / area.sqrt();
-    // Clamped, as the squared units of a finite file may overflow and reports are written as JSON.
-    report.area = (area * scale * scale).min(f64::MAX);
-    report.warnings = warnings(&report, simplified);
-    Ok((mesh.normalised()?, report))
-}
-
-/// One sentence for everything that may surprise a user in the ranking.
-fn warnings(report: &PrepareReport, simplified: Simplified) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let mut warn = |condition: bool, sentence: String| {
-        if condition {
-            warnings.push(sentence);
-        }
-    };
-    warn(
-        10 * report.degenerate_faces > report.input_faces,
-        format!(
-            "{} of {} faces have no area and were dropped.",
-            report.degenerate_faces, report.input_faces
-        ),
-    );
-    warn(
-        report.area_dropped > 0.1,
-        format!(
-            "{} of {} separate parts were left out, with {:.0} % of the surface area.",
-            report.components_dropped,
-            report.components,
-            100.0 * report.area_dropped
-        ),
-    );
-    warn(
-        report.components > MANY_COMPONENTS,
-        format!(
-            "The mesh falls into {} separate parts; parts of one shape should be connected.",
-            report.components
-        ),
-    );
-    warn(
-        report.non_manifold_edges > 0,
-        format!(
-            "The mesh is not a manifold: more than two faces meet at {} of its edges.",
-            report.non_manifold_edges
-        ),
-    );
-    warn(
-        report.openness > OPEN,
-        format!(
-            "The surface is open: its boundary is {:.1} times the square root of its area.",
-            report.openness
-        ),
-    );
-    warn(
-        report.simplified_from.is_some(),
-        format!(
-            "The mesh was simplified from {} to {} vertices.",
-            report.simplified_from.unwrap_or_default(),
-            report.vertices
-        ),
-    );
-    warn(
-        simplified == Simplified::AcrossTopology,
-        "The simplification had to collapse across non-manifold places.".to_owned(),
-    );
-    warn(
-        simplified == Simplified::ByClustering,
-        "The mesh could not be simplified by edge collapses; its vertices were clustered, which may change its topology.".to_owned(),
-    );
-    warn(
-        report.vertices < FEW_VERTICES,
-        format!(
-            "Only {} vertices are left; fewer than {FEW_VERTICES} describe a shape poorly.",
-            report.vertices
-        ),
-    );
-    warnings
+    work.check()?;
+    Ok((TriMesh::new(vertices, faces, report.vertices)?, census))
 }

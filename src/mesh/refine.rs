@@ -1,7 +1,10 @@
 //! More vertices on the same surface, for meshes too coarse for the eigenfunctions that are asked of them.
 
 use super::edges::for_each_edge;
+use super::work::{Watch, Work};
 use super::{MeshError, TriMesh};
+use crate::cancel::Cancel;
+use crate::memory::MemoryBudget;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
@@ -18,6 +21,13 @@ type Edge = (u32, u32);
 ///
 /// Errors: those of [`TriMesh::new`], which a mesh that came from it does not meet but by rounding.
 pub fn refine(mesh: TriMesh, target: usize) -> Result<TriMesh, MeshError> {
+    refine_until(mesh, target, &Cancel::new())
+}
+
+/// As [`refine`], for a caller that may ask to stop.
+///
+/// Errors: those of [`refine`], and [`MeshError::Cancelled`].
+pub fn refine_until(mesh: TriMesh, target: usize, cancel: &Cancel) -> Result<TriMesh, MeshError> {
     if mesh.vertices().len() >= target {
         return Ok(mesh);
     }
@@ -25,8 +35,14 @@ pub fn refine(mesh: TriMesh, target: usize) -> Result<TriMesh, MeshError> {
         .map(|v| v < mesh.signature_vertices())
         .collect();
     let (vertices, faces) = mesh.into_parts();
-    let mut surface = Surface::new(vertices, faces);
+    let memory = MemoryBudget::unlimited().reservation();
+    let work = Work {
+        cancel,
+        memory: &memory,
+    };
+    let mut surface = Surface::new(vertices, faces, work)?;
     while surface.vertices.len() < target {
+        work.check()?;
         let Some((a, b)) = surface.split_longest() else {
             break;
         };
@@ -66,12 +82,12 @@ struct Surface {
 }
 
 impl Surface {
-    fn new(vertices: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Self {
+    fn new(vertices: Vec<[f64; 3]>, faces: Vec<[u32; 3]>, work: Work) -> Result<Self, MeshError> {
         let mut faces_of = HashMap::new();
-        for_each_edge(vertices.len(), &faces, |a, b, group| {
+        for_each_edge(vertices.len(), &faces, &work, |a, b, group| {
             let at: Vec<u32> = group.iter().map(|half| half / 6).collect();
             faces_of.insert((a, b), at);
-        });
+        })?;
         let mut surface = Self {
             vertices,
             faces,
@@ -79,8 +95,11 @@ impl Surface {
             faces_of,
         };
         let edges: Vec<Edge> = surface.faces_of.keys().copied().collect();
-        edges.into_iter().for_each(|edge| surface.queue(edge));
-        surface
+        for (i, edge) in edges.into_iter().enumerate() {
+            work.look(i)?;
+            surface.queue(edge);
+        }
+        Ok(surface)
     }
 
     fn queue(&mut self, edge: Edge) {

@@ -1,6 +1,6 @@
 //! Where edge collapses cost too much for what they give.
 
-use super::edges::edge_census;
+use super::edges::EdgeCounts;
 
 /// Most pairs of faces at a vertex, summed over the vertices, that a call of the collapses may look at (see [`pairs`]).
 /// It takes some tenths of a second at most; a vertex of 14 000 faces alone makes as many.
@@ -8,6 +8,9 @@ pub(super) const MOST_PAIRS: u64 = 200_000_000;
 
 /// Share of the vertices that may lie where a mesh is no surface.
 const IRREGULAR: f64 = 0.01;
+
+/// Share of them above which the mesh is a surface hardly anywhere.
+const NO_SURFACE: f64 = 0.5;
 
 /// Σ deg(v)² over the vertices, deg(v) the number of faces at v: to tell borders from other edges, the collapses look
 /// through all edges of a vertex for each of them. It is some 36 per vertex of a surface, but a hub of a million faces
@@ -22,12 +25,11 @@ pub(super) fn pairs(vertices: usize, corners: &[u32]) -> u64 {
 
 /// Whether hardly any collapse is possible while each round of looking for them is as long as on a surface: at many
 /// vertices more than two border edges meet, or an edge has more than two faces.
-pub(super) fn is_tangle(vertices: usize, faces: &[[u32; 3]]) -> bool {
-    let census = edge_census(vertices, faces);
-    let mut borders = vec![0u8; vertices];
-    for &v in census.boundary.as_flattened() {
-        borders[v as usize] = borders[v as usize].saturating_add(1);
-    }
-    let irregular = borders.iter().filter(|&&b| b > 2).count() + census.non_manifold;
-    irregular as f64 > IRREGULAR * vertices as f64
+pub(super) fn is_tangle(vertices: usize, edges: &EdgeCounts) -> bool {
+    edges.irregular as f64 > IRREGULAR * vertices as f64
+}
+
+/// Whether a mesh is a surface hardly anywhere, so that collapses need not be tried.
+pub(super) fn is_no_surface(vertices: usize, edges: &EdgeCounts) -> bool {
+    edges.irregular as f64 > NO_SURFACE * vertices as f64
 }

@@ -1,7 +1,6 @@
 //! How well a class fits shapes of its own that it was learnt without: what answers are judged by.
 
 use super::near_copies::groups;
-use super::prepared::OPEN_ABOVE;
 use super::{Description, PipelineError, learn_model};
 use crate::cancel::Cancel;
 use crate::parameters::{Hypothesis, Parameters, RankBy};
@@ -68,7 +67,7 @@ fn scores(
         let (held, rest): (Vec<_>, Vec<_>) = all.partition(|(_, group)| *group % folds == fold);
         let rest: Vec<&Description> = rest.into_iter().map(|(shape, _)| *shape).collect();
         let model = learn_model(&rest, parameters, cancel, &|_, _| ())?;
-        for (shape, _) in held.into_iter().filter(|(s, _)| s.report.openness <= OPEN_ABOVE) {
+        for (shape, _) in held.into_iter().filter(|(s, _)| !s.report.is_open()) {
             // A training shape's view on the fixed grid is there to be learnt from; as a query it would be open.
             let views: Vec<View> = shape
                 .views

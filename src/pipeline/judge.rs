@@ -1,7 +1,6 @@
 //! A ranking and a calibration → what the answer says.
 
 use super::Description;
-use super::prepared::OPEN_ABOVE;
 use crate::parameters::{Parameters, RankBy};
 use crate::ranking::{Calibration, Candidate, JUDGED, NotJudged, Verdict};
 
@@ -18,7 +17,7 @@ pub fn judged_by<'a>(
     if rank_by != parameters.rank_by || rank_by == RankBy::Frobenius {
         return Err(NotJudged::OtherMeasure);
     }
-    if description.report.openness > OPEN_ABOVE {
+    if description.report.is_open() {
         return Err(NotJudged::Open);
     }
     calibration.as_ref().map_err(|reason| *reason)

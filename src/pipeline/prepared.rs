@@ -3,7 +3,7 @@
 use super::{Description, PipelineError, Stage};
 use crate::cancel::Cancel;
 use crate::mesh::boundary::{boundary_vertices, smooth_boundary};
-use crate::mesh::refine::refine;
+use crate::mesh::refine::refine_until;
 use crate::mesh::whiten::whiten;
 use crate::mesh::{PrepareReport, TriMesh, TriangleSoup, prepare_until};
 use crate::parameters::{Hypothesis, Parameters};
@@ -13,9 +13,6 @@ use crate::spectral::{
     EigenOptions, Eigenpairs, Operators, assemble, doubled_eigenpairs, smallest_eigenpairs,
 };
 
-/// A surface whose boundary loops are longer than this many √area is open: a single view has 8 to 16, a half sphere
-/// 2.507.
-pub const OPEN_ABOVE: f64 = 2.5;
 /// How many eigenvalues a description reports.
 const REPORTED_EIGENVALUES: usize = 20;
 
@@ -25,7 +22,7 @@ const REPORTED_EIGENVALUES: usize = 20;
 /// errors of discretisation, which a finer one has not.
 pub fn refined_to(report: &PrepareReport, parameters: &Parameters) -> usize {
     let enough = report.vertices + report.holes_filled >= parameters.refine_below;
-    if enough || report.openness > OPEN_ABOVE {
+    if enough || report.is_open() {
         0
     } else {
         parameters.refine_below
@@ -37,7 +34,7 @@ pub fn refined_to(report: &PrepareReport, parameters: &Parameters) -> usize {
 /// Then all of its views are coded under the dictionaries of the fixed grid, so that the errors of the doubled surface
 /// compare with those of the surface as it is; and it is not whitened, as a part's moments are not the whole's.
 pub fn taken_as_part(report: &PrepareReport, parameters: &Parameters) -> bool {
-    report.openness > OPEN_ABOVE && parameters.hypotheses.contains(&Hypothesis::Doubled)
+    report.is_open() && parameters.hypotheses.contains(&Hypothesis::Doubled)
 }
 
 /// A mesh with the spectra its views are taken from.
@@ -87,12 +84,15 @@ impl PreparedShape {
         observer: &dyn Fn(Stage),
     ) -> Result<Self, PipelineError> {
         observer(Stage::Prepare);
-        let (mesh, report) = prepare_until(soup, &parameters.prepare_options(), cancel)?;
+        let (mesh, mut report) = prepare_until(soup, &parameters.prepare_options(), cancel)?;
         let part = taken_as_part(&report, parameters);
         let mesh = if part {
             smooth_boundary(mesh)?
         } else {
-            refine(mesh, refined_to(&report, parameters))?
+            let coarse = mesh.vertices().len();
+            let mesh = refine_until(mesh, refined_to(&report, parameters), cancel)?;
+            report.refined_to = Some(mesh.vertices().len()).filter(|fine| *fine > coarse);
+            mesh
         };
         cancel.check()?;
         observer(Stage::Laplacian);

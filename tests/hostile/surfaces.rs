@@ -190,7 +190,15 @@ pub const CASES: &[fn() -> Case] = &[
         )
     },
     || ("two STL in one", "model/stl", two_stl(), 422, "malformed_mesh"),
-    || ("3000 triangles", "model/off", triangles(), 422, "mesh_too_small"),
+    || {
+        (
+            "3000 triangles",
+            "model/off",
+            triangles(),
+            422,
+            "disconnected_mesh",
+        )
+    },
     || ("one place", "model/off", coincident(), 422, "degenerate_mesh"),
 ];
 

@@ -3,7 +3,10 @@
 mod cleaning;
 mod hostile;
 mod hypotheses;
+mod large;
+mod noise;
 mod real;
 mod refinement;
 mod shapes;
 mod simplification;
+mod slivers;

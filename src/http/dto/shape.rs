@@ -31,8 +31,13 @@ pub struct ReportDto {
     pub input_faces: usize,
     /// Vertices merged into a coincident one.
     pub welded_vertices: usize,
+    /// Where copies of a vertex differ in the file's last digits: vertices closer than this, in the file's units, were
+    /// merged.
+    pub welded_within: Option<f64>,
     /// Faces dropped for a repeated vertex or (nearly) no area.
     pub degenerate_faces: usize,
+    /// Faces without area that were taken out so that the surface stays closed.
+    pub repaired_faces: usize,
     /// Faces dropped because the same three vertices have one already.
     pub duplicate_faces: usize,
     /// Vertices dropped because no face uses them.
@@ -53,13 +58,16 @@ pub struct ReportDto {
     pub simplified_from: Option<usize>,
     /// Vertices that carry signatures, before a coarse mesh is refined.
     pub vertices: usize,
-    /// Faces of the prepared mesh.
+    /// Vertices after refinement, where a coarse mesh was refined for its spectrum.
+    pub refined_to: Option<usize>,
+    /// Faces of the prepared mesh, before a coarse mesh is refined.
     pub faces: usize,
     /// Surface area in the file's squared units.
     pub area: f64,
     /// Length of the boundary's loops over the root of the area: 0 for a closed surface, 8 to 16 for a single view.
     pub openness: f64,
-    /// Things you should know, one sentence each.
+    /// What may change a result, one sentence each. Simplification and refinement are normal: see `simplified_from` and
+    /// `refined_to`.
     pub warnings: Vec<String>,
 }
 
@@ -69,7 +77,9 @@ impl From<PrepareReport> for ReportDto {
             input_vertices: report.input_vertices,
             input_faces: report.input_faces,
             welded_vertices: report.welded_vertices,
+            welded_within: report.welded_within,
             degenerate_faces: report.degenerate_faces,
+            repaired_faces: report.repaired_faces,
             duplicate_faces: report.duplicate_faces,
             unreferenced_vertices: report.unreferenced_vertices,
             components: report.components,
@@ -80,6 +90,7 @@ impl From<PrepareReport> for ReportDto {
             holes_filled: report.holes_filled,
             simplified_from: report.simplified_from,
             vertices: report.vertices,
+            refined_to: report.refined_to,
             faces: report.faces,
             area: report.area,
             openness: report.openness,
