@@ -117,7 +117,9 @@ fn follow(client: &Client, mut job: Value) -> Result<Value, CliError> {
                 let detail = job["failure"]["detail"].as_str().unwrap_or("no reason given");
                 return Err(CliError::Failed(format!("the reindex failed: {detail}")));
             }
-            Some("canceled") => return Err(CliError::Failed("the reindex was cancelled".to_owned())),
+            Some("cancelled" | "canceled") => {
+                return Err(CliError::Failed("the reindex was cancelled".to_owned()));
+            }
             _ => {}
         }
         std::thread::sleep(POLL_EVERY);

@@ -1,12 +1,14 @@
 //! axum's extractors with problems for rejections.
 
 use super::problem::{Code, Problem};
+use super::query_string;
 use super::upload::body_too_large;
-use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
+use axum::extract::{FromRequest, FromRequestParts, Path, Request};
 use axum::http::header;
 use axum::http::request::Parts;
 use serde::de::DeserializeOwned;
 use std::time::Duration;
+use utoipa::IntoParams;
 
 /// The longest JSON body, in bytes.
 pub const MAX_JSON_BYTES: usize = 256 << 10;
@@ -31,14 +33,11 @@ impl<S: Send + Sync, T: DeserializeOwned + Send> FromRequestParts<S> for ApiPath
 /// Query parameters.
 pub struct ApiQuery<T>(pub T);
 
-impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for ApiQuery<T> {
+impl<S: Send + Sync, T: DeserializeOwned + IntoParams> FromRequestParts<S> for ApiQuery<T> {
     type Rejection = Problem;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
-        Query::<T>::from_request_parts(parts, state)
-            .await
-            .map(|Query(value)| Self(value))
-            .map_err(|e| Problem::new(Code::InvalidQuery, e.body_text()))
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        query_string::parse(&parts.uri).map(Self)
     }
 }
 
@@ -106,15 +105,35 @@ fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
             "expected an object, found a list",
         ));
     }
-    serde_json::from_slice(body).map_err(|error| {
-        let code = match error.classify() {
-            serde_json::error::Category::Data => Code::InvalidField,
-            _ => Code::InvalidJson,
-        };
-        Problem::new(code, error.to_string())
-            .with("line", error.line())
-            .with("column", error.column())
-    })
+    let mut reader = serde_json::Deserializer::from_slice(body);
+    let value = serde_path_to_error::deserialize(&mut reader)
+        .map_err(|error| refused(&error.path().to_string(), error.inner()))?;
+    reader.end().map_err(|error| refused(".", &error))?;
+    Ok(value)
+}
+
+/// The problem of a body that is no JSON, or whose field at `path` is not what it must be; `.` is the body itself.
+fn refused(path: &str, error: &serde_json::Error) -> Problem {
+    let text = error.to_string();
+    // The place has members of its own.
+    let reason = text.split(" at line ").next().unwrap_or_default();
+    let problem = match error.classify() {
+        serde_json::error::Category::Data if path == "." => {
+            Problem::new(Code::InvalidField, format!("the body: {reason}"))
+        }
+        serde_json::error::Category::Data => {
+            Problem::new(Code::InvalidField, format!("{path}: {reason}")).with("name", path)
+        }
+        _ => Problem::new(
+            Code::InvalidJson,
+            format!(
+                "not JSON: {reason} (line {}, column {})",
+                error.line(),
+                error.column()
+            ),
+        ),
+    };
+    problem.with("line", error.line()).with("column", error.column())
 }
 
 /// For fields that are objects: refuses the lists serde would read as their fields in order.

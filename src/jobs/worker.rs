@@ -155,7 +155,7 @@ fn finish(inner: &Inner, id: JobId, channel: &watch::Sender<Job>, ended: Result<
             job.attempts = job.attempts.saturating_sub(1);
             job.steps.clear();
         }
-        Err(ReindexError::Cancelled) => job.state = JobState::Canceled,
+        Err(ReindexError::Cancelled) => job.state = JobState::Cancelled,
         Err(ReindexError::Failed(failure)) => {
             tracing::warn!(job = %id, code = failure.code, detail = failure.detail, "a job failed");
             job.state = JobState::Failed;
@@ -164,6 +164,7 @@ fn finish(inner: &Inner, id: JobId, channel: &watch::Sender<Job>, ended: Result<
     }
     if job.state.is_finished() {
         job.finished_at = Some(Timestamp::now());
+        super::metrics::count(&job);
         state.channels.remove(&id);
     }
     if let Err(error) = inner

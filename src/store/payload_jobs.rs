@@ -143,7 +143,7 @@ impl Record for Job {
             JobState::Processing => 1,
             JobState::Succeeded => 2,
             JobState::Failed => 3,
-            JobState::Canceled => 4,
+            JobState::Cancelled => 4,
         };
         pack(&JobV1 {
             id: self.id.to_bytes(),

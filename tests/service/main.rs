@@ -1,6 +1,7 @@
 //! The service, driven through its router: one binary, no sockets.
 #![cfg(feature = "service")]
 
+mod answers;
 mod bad_input;
 mod baselines;
 mod batch;
