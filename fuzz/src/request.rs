@@ -43,8 +43,8 @@ pub fn check(bytes: &[u8]) {
 fn page(bytes: &[u8]) {
     if let Some(page) = query::<PageQuery>(bytes) {
         assert!(page.limit().is_ok_and(|n| (1..=1000).contains(&n)) || page.limit().is_err());
-        let _ = page.after::<ClassId>();
-        let _ = page.after::<ClassName>();
+        let _ = page.after::<ClassId>("classes");
+        let _ = page.after::<ClassName>("classes");
     }
 }
 
@@ -72,10 +72,18 @@ fn serde_json_round_trip(parameters: &Parameters) -> Parameters {
     serde_json::from_str(&serde_json::to_string(parameters).expect("plain data")).expect("reads back")
 }
 
-fn query<T: serde::de::DeserializeOwned>(bytes: &[u8]) -> Option<T> {
+fn query<T>(bytes: &[u8]) -> Option<T>
+where
+    ApiQuery<T>: FromRequestParts<()>,
+{
     let uri = Uri::try_from([b"/v1/query?".as_slice(), bytes].concat()).ok()?;
     let (mut parts, ()) = Request::get(uri).body(()).ok()?.into_parts();
-    let found = RUNTIME.with(|runtime| runtime.block_on(ApiQuery::<T>::from_request_parts(&mut parts, &())));
+    let found = RUNTIME.with(|runtime| {
+        runtime.block_on(<ApiQuery<T> as FromRequestParts<()>>::from_request_parts(
+            &mut parts,
+            &(),
+        ))
+    });
     found.ok().map(|ApiQuery(value)| value)
 }
 

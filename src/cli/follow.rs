@@ -70,7 +70,7 @@ pub fn follow(client: &Client, job: Value) -> Result<Value, CliError> {
 pub fn succeeded(job: Value) -> Result<Value, CliError> {
     match job["state"].as_str() {
         Some("succeeded") => Ok(job),
-        Some("canceled") => Err(CliError::Failed("the reindex was cancelled".to_owned())),
+        Some("cancelled" | "canceled") => Err(CliError::Failed("the reindex was cancelled".to_owned())),
         _ => {
             let detail = job["failure"]["detail"].as_str().unwrap_or("no reason given");
             Err(CliError::Failed(format!("the reindex failed: {detail}")))
@@ -79,7 +79,7 @@ pub fn succeeded(job: Value) -> Result<Value, CliError> {
 }
 
 fn has_ended(job: &Value) -> bool {
-    matches!(job["state"].as_str(), Some("succeeded" | "failed" | "canceled"))
+    matches!(job["state"].as_str(), Some("succeeded" | "failed" | "cancelled" | "canceled"))
 }
 
 /// The progress of a job's steps, one after the other.

@@ -111,6 +111,8 @@ pub fn answer(
     for (stage, took) in &stages {
         metrics::time_stage(*stage, *took);
     }
+    let best = ranking.classes.first();
+    metrics::count_answer(ranking.none_of_these, best.and_then(|class| class.p_value));
     let class_of = |label: &str| ClassRef {
         id: label.to_owned(),
         name: name_of(label),
@@ -244,8 +246,12 @@ fn present(state: &Parts, live: &LiveIndex) -> Result<(Index, BTreeMap<String, S
     Ok((Index { parameters, classes }, names))
 }
 
+/// A duration in milliseconds, to the microsecond, so that logs and answers have no digits without meaning.
+pub(super) fn milliseconds(duration: Duration) -> f64 {
+    (duration.as_secs_f64() * 1e6).round() / 1e3
+}
+
 fn timings(stages: &[(Stage, Duration)], waited: Duration, total: Duration) -> BTreeMap<String, f64> {
-    let milliseconds = |d: Duration| (d.as_secs_f64() * 1e6).round() / 1e3;
     let mut timings: BTreeMap<String, f64> = stages
         .iter()
         .map(|(stage, took)| (stage.name().to_owned(), milliseconds(*took)))

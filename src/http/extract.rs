@@ -1,12 +1,14 @@
 //! axum's extractors with problems for rejections.
 
 use super::problem::{Code, Problem};
+use super::query_string;
 use super::upload::body_too_large;
-use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
+use axum::extract::{FromRequest, FromRequestParts, Path, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, header};
 use serde::de::DeserializeOwned;
 use std::time::Duration;
+use utoipa::IntoParams;
 
 /// The longest JSON body, in bytes.
 pub const MAX_JSON_BYTES: usize = 256 << 10;
@@ -31,14 +33,11 @@ impl<S: Send + Sync, T: DeserializeOwned + Send> FromRequestParts<S> for ApiPath
 /// Query parameters.
 pub struct ApiQuery<T>(pub T);
 
-impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for ApiQuery<T> {
+impl<S: Send + Sync, T: DeserializeOwned + IntoParams> FromRequestParts<S> for ApiQuery<T> {
     type Rejection = Problem;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
-        Query::<T>::from_request_parts(parts, state)
-            .await
-            .map(|Query(value)| Self(value))
-            .map_err(|e| Problem::new(Code::InvalidQuery, e.body_text()))
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        query_string::parse(&parts.uri).map(Self)
     }
 }
 
@@ -123,28 +122,30 @@ fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
             "expected an object, found a list",
         ));
     }
-    let mut deserializer = serde_json::Deserializer::from_slice(body);
-    let parsed = serde_path_to_error::deserialize(&mut deserializer);
-    parsed
-        .map_err(|error| {
-            let path = error.path().to_string();
-            (error.into_inner(), path)
-        })
-        .and_then(|value| {
-            let rest = deserializer.end();
-            rest.map(|()| value).map_err(|error| (error, ".".to_owned()))
-        })
-        .map_err(|(error, path)| {
-            let position = (error.line(), error.column());
-            // A field of the wrong type reads as bad syntax where another was expected.
-            let valid = serde_json::from_slice::<serde::de::IgnoredAny>(body).is_ok();
-            let problem = match path.as_str() {
-                _ if !valid => Problem::new(Code::InvalidJson, error.to_string()),
-                "." => Problem::new(Code::InvalidField, error.to_string()),
-                path => Problem::new(Code::InvalidField, format!("{path}: {error}")).with("name", path),
-            };
-            problem.with("line", position.0).with("column", position.1)
-        })
+    let mut reader = serde_json::Deserializer::from_slice(body);
+    let value = serde_path_to_error::deserialize(&mut reader)
+        .map_err(|error| refused(body, &error.path().to_string(), error.inner()))?;
+    reader.end().map_err(|error| refused(body, ".", &error))?;
+    Ok(value)
+}
+
+/// The problem of a body that is no JSON, or whose field at `path` is not what it must be; `.` is the body itself.
+fn refused(body: &[u8], path: &str, error: &serde_json::Error) -> Problem {
+    let text = error.to_string();
+    // The place has members of its own.
+    let reason = text.split(" at line ").next().unwrap_or_default();
+    let (line, column) = (error.line(), error.column());
+    // A field of the wrong type reads as bad syntax where another was expected.
+    let is_json = serde_json::from_slice::<serde::de::IgnoredAny>(body).is_ok();
+    let problem = match path {
+        _ if !is_json => Problem::new(
+            Code::InvalidJson,
+            format!("not JSON: {reason} (line {line}, column {column})"),
+        ),
+        "." => Problem::new(Code::InvalidField, format!("the body: {reason}")),
+        path => Problem::new(Code::InvalidField, format!("{path}: {reason}")).with("name", path),
+    };
+    problem.with("line", line).with("column", column)
 }
 
 /// For fields that are objects: refuses the lists serde would read as their fields in order.

@@ -5,10 +5,11 @@
 
 use super::problem::Code;
 use super::state::AppState;
+use crate::jobs::metrics::JOB_SECONDS;
 use crate::pipeline::Stage;
 use crate::store::ScrubReport;
 use ::metrics::{counter, describe_counter, describe_gauge, describe_histogram, gauge, histogram};
-use metrics_exporter_prometheus::{PrometheusBuilder, PrometheusHandle};
+use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -17,21 +18,31 @@ const BUCKETS: &[f64] = &[
     0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0,
 ];
 
+/// Upper bounds of a reindex's time, in seconds.
+const JOB_BUCKETS: &[f64] = &[1.0, 5.0, 10.0, 30.0, 60.0, 300.0, 600.0, 1800.0, 3600.0, 14_400.0];
+/// Upper bounds of p-values: a query whose best class is below 0.05 is of none of the known classes.
+const P_VALUE_BUCKETS: &[f64] = &[0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
+
 const REQUESTS: &str = "shapelex_http_requests_total";
 const REQUEST_SECONDS: &str = "shapelex_http_request_seconds";
 const PROBLEMS: &str = "shapelex_problems_total";
 const STAGE_SECONDS: &str = "shapelex_stage_seconds";
 const WAIT_SECONDS: &str = "shapelex_compute_wait_seconds";
 const PANICS: &str = "shapelex_panics_total";
+const ANSWERS: &str = "shapelex_query_answers_total";
+const P_VALUES: &str = "shapelex_query_p_value";
+const BUILD_INFO: &str = "shapelex_build_info";
 
 static RECORDER: OnceLock<PrometheusHandle> = OnceLock::new();
 
 /// The process's recorder; the first call installs it.
 pub fn install() -> &'static PrometheusHandle {
     RECORDER.get_or_init(|| {
-        // Buckets are a constant, so setting them fails for no value.
+        // Buckets are constants, so setting them fails for no value.
         let builder = PrometheusBuilder::new()
             .set_buckets(BUCKETS)
+            .and_then(|builder| builder.set_buckets_for_metric(full(JOB_SECONDS), JOB_BUCKETS))
+            .and_then(|builder| builder.set_buckets_for_metric(full(P_VALUES), P_VALUE_BUCKETS))
             .unwrap_or_else(|_| PrometheusBuilder::new());
         let recorder = builder.build_recorder();
         let handle = recorder.handle();
@@ -44,7 +55,19 @@ pub fn install() -> &'static PrometheusHandle {
     })
 }
 
+fn full(name: &str) -> Matcher {
+    Matcher::Full(name.to_owned())
+}
+
 fn describe() {
+    crate::jobs::metrics::describe();
+    metrics_process::Collector::default().describe();
+    describe_counter!(
+        ANSWERS,
+        "Queries answered, by verdict: known (a class is possible), none_of_these, or not_judged"
+    );
+    describe_histogram!(P_VALUES, "p-value of the best class of a query that was judged");
+    describe_gauge!(BUILD_INFO, "1, with the version that runs");
     describe_counter!(REQUESTS, "Requests answered, by operation and class of status");
     describe_histogram!(REQUEST_SECONDS, "Seconds until the answer began, by operation");
     describe_counter!(PROBLEMS, "Problems answered, by code");
@@ -106,6 +129,11 @@ fn zero() {
     }
     let _ = histogram!(WAIT_SECONDS);
     counter!(PANICS).increment(0);
+    for verdict in ["known", "none_of_these", "not_judged"] {
+        counter!(ANSWERS, "verdict" => verdict).increment(0);
+    }
+    let _ = histogram!(P_VALUES);
+    gauge!(BUILD_INFO, "version" => env!("CARGO_PKG_VERSION")).set(1.0);
 }
 
 const STAGES: [Stage; 6] = [
@@ -144,6 +172,19 @@ pub fn time_wait(took: Duration) {
     histogram!(WAIT_SECONDS).record(took.as_secs_f64());
 }
 
+/// A query was answered: whether a class is possible, where that could be judged, and the best class's p-value.
+pub fn count_answer(none_of_these: Option<bool>, p_value: Option<f64>) {
+    let verdict = match none_of_these {
+        Some(true) => "none_of_these",
+        Some(false) => "known",
+        None => "not_judged",
+    };
+    counter!(ANSWERS, "verdict" => verdict).increment(1);
+    if let Some(p_value) = p_value {
+        histogram!(P_VALUES).record(p_value);
+    }
+}
+
 /// A panic was caught.
 pub fn count_panic() {
     counter!(PANICS).increment(1);
@@ -175,6 +216,7 @@ pub fn render(state: &AppState) -> String {
         gauge!("shapelex_disk_free_bytes").set(free as f64);
     }
     read_integrity(state);
+    metrics_process::Collector::default().collect();
     handle.run_upkeep();
     handle.render()
 }

@@ -77,7 +77,7 @@ pub async fn around(State(state): State<AppState>, mut request: Request, next: N
     }
     trace_context::end(&span, status, outcome);
     metrics::count_request(operation, status.as_u16(), took);
-    let milliseconds = took.as_secs_f64() * 1e3;
+    let milliseconds = super::answer::milliseconds(took);
     span.in_scope(|| {
         if is_probe(operation) || operation == "get_metrics" {
             tracing::debug!(status = status.as_u16(), milliseconds, "answered");

@@ -1,6 +1,7 @@
 //! The route table.
 
 use super::auth::API_KEY;
+use super::compression;
 use super::respond::{REQUEST_ID, around, panicked, route_not_found};
 use super::routes::{classes, docs, health, index, jobs, keys, query, shapes, snapshots};
 use super::state::AppState;
@@ -75,6 +76,7 @@ pub fn router(state: AppState) -> Router {
         .layer(DefaultBodyLimit::max(state.config.max_body_bytes))
         .layer(CatchPanicLayer::custom(panicked))
         .layer(from_fn_with_state(state.clone(), around))
+        .layer(compression::layer())
         .with_state(state);
     match cors {
         Some(cors) => routes.layer(cors),

@@ -10,6 +10,7 @@ pub mod error;
 mod exclusive;
 mod failure;
 mod live;
+pub mod metrics;
 mod plan;
 mod priority;
 mod progress;
@@ -294,9 +295,10 @@ impl Jobs {
             running.cancel.cancel();
             return Ok(job);
         }
-        job.state = JobState::Canceled;
+        job.state = JobState::Cancelled;
         job.finished_at = Some(Timestamp::now());
         self.inner.store.put_job(&job)?;
+        metrics::count(&job);
         state.waiting.retain(|waiting| *waiting != id);
         if let Some(channel) = state.channels.remove(&id) {
             channel.send_replace(job.clone());

@@ -177,8 +177,8 @@ fn finish(inner: &Inner, id: JobId, channel: &watch::Sender<Job>, ended: Result<
             job.attempts = job.attempts.saturating_sub(1);
             job.steps.clear();
         }
-        Err(ReindexError::Cancelled) => job.state = JobState::Canceled,
-        Err(ReindexError::Later(_)) if on_request => job.state = JobState::Canceled,
+        Err(ReindexError::Cancelled) => job.state = JobState::Cancelled,
+        Err(ReindexError::Later(_)) if on_request => job.state = JobState::Cancelled,
         Err(ReindexError::Later(why)) => {
             tracing::warn!(job = %id, why, "a job cannot be done now and is tried again");
             job.state = JobState::Enqueued;
@@ -195,6 +195,7 @@ fn finish(inner: &Inner, id: JobId, channel: &watch::Sender<Job>, ended: Result<
     }
     if job.state.is_finished() {
         job.finished_at = Some(Timestamp::now());
+        super::metrics::count(&job);
         state.channels.remove(&id);
     }
     if let Err(error) = inner

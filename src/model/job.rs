@@ -44,7 +44,7 @@ pub enum JobState {
     /// Could not; see [`Job::failure`].
     Failed,
     /// Was stopped on request.
-    Canceled,
+    Cancelled,
 }
 
 impl JobState {
@@ -54,12 +54,12 @@ impl JobState {
         Self::Processing,
         Self::Succeeded,
         Self::Failed,
-        Self::Canceled,
+        Self::Cancelled,
     ];
 
     /// Whether the state is final.
     pub fn is_finished(self) -> bool {
-        matches!(self, Self::Succeeded | Self::Failed | Self::Canceled)
+        matches!(self, Self::Succeeded | Self::Failed | Self::Cancelled)
     }
 
     /// The state's name on the wire and in metrics.
@@ -69,7 +69,7 @@ impl JobState {
             Self::Processing => "processing",
             Self::Succeeded => "succeeded",
             Self::Failed => "failed",
-            Self::Canceled => "canceled",
+            Self::Cancelled => "cancelled",
         }
     }
 }

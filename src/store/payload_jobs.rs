@@ -173,7 +173,7 @@ fn state_number(state: JobState) -> u8 {
         JobState::Processing => 1,
         JobState::Succeeded => 2,
         JobState::Failed => 3,
-        JobState::Canceled => 4,
+        JobState::Cancelled => 4,
     }
 }
 
@@ -183,7 +183,7 @@ fn state_of(number: u8) -> Result<JobState, String> {
         1 => Ok(JobState::Processing),
         2 => Ok(JobState::Succeeded),
         3 => Ok(JobState::Failed),
-        4 => Ok(JobState::Canceled),
+        4 => Ok(JobState::Cancelled),
         _ => Err(format!("unknown job state {number}")),
     }
 }

@@ -72,7 +72,13 @@ pub fn init(filter: &str, format: LogFormat, collector: Option<&str>) -> Result<
         .with_ansi(std::io::stderr().is_terminal());
     let mut layers: Vec<BoxedLayer> = vec![match format {
         LogFormat::Text => lines.with_filter(filter).boxed(),
-        LogFormat::Json => lines.json().flatten_event(true).with_filter(filter).boxed(),
+        // The list of spans ends with the current one.
+        LogFormat::Json => lines
+            .json()
+            .flatten_event(true)
+            .with_current_span(false)
+            .with_filter(filter)
+            .boxed(),
     }];
     let export = match collector {
         None => Export::default(),

@@ -22,3 +22,4 @@ mod snapshots;
 mod stored_files;
 mod strangers;
 mod uploads;
+mod wire;

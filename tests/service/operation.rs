@@ -140,3 +140,35 @@ async fn a_mesh_that_does_not_fit_the_memory_is_refused_before_it_is_built() {
     assert_eq!(app.get("/v1/classes").await.value()["items"], json!([]));
     assert_eq!(app.state.memory.used(), 0);
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn metrics_tell_of_the_process_the_build_the_jobs_and_the_verdicts() {
+    let app = App::indexed().await;
+    let query = app
+        .post("/v1/query", "model/off", crate::meshes::off("bean", 9))
+        .await;
+    assert_eq!(query.status, 200);
+    let metrics = app.get("/metrics").await.text();
+    let value = |series: &str| -> f64 {
+        let line = metrics.lines().find(|line| line.starts_with(series));
+        let value = line.and_then(|line| line.rsplit(' ').next());
+        value.unwrap_or_else(|| panic!("no {series}")).parse().unwrap()
+    };
+    assert!(value("process_cpu_seconds_total") > 0.0);
+    assert!(value("process_resident_memory_bytes") > 1e6);
+    assert!(value("process_open_fds") > 2.0);
+    assert!(value("process_threads") > 1.0);
+    let build = format!("shapelex_build_info{{version=\"{}\"}}", env!("CARGO_PKG_VERSION"));
+    assert_eq!(value(&build), 1.0);
+    // Other tests of this process run jobs and queries too.
+    assert!(value("shapelex_jobs_total{outcome=\"succeeded\"}") >= 1.0);
+    assert!(value("shapelex_job_seconds_count{outcome=\"succeeded\"}") >= 1.0);
+    for verdict in ["known", "none_of_these", "not_judged"] {
+        value(&format!("shapelex_query_answers_total{{verdict=\"{verdict}\"}}"));
+    }
+    let judged: f64 = ["known", "none_of_these"]
+        .map(|verdict| value(&format!("shapelex_query_answers_total{{verdict=\"{verdict}\"}}")))
+        .iter()
+        .sum();
+    assert!(value("shapelex_query_p_value_count") >= judged.min(1.0));
+}

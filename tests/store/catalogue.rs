@@ -159,7 +159,7 @@ fn lists_come_in_pages() {
             };
             let mut job = Job::new(kind, jiff::Timestamp::now());
             if i % 2 == 0 {
-                job.state = JobState::Canceled;
+                job.state = JobState::Cancelled;
             }
             store.put_job(&job).unwrap();
             job

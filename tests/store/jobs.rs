@@ -344,16 +344,16 @@ fn jobs_wait_in_a_bounded_queue_and_can_be_cancelled() {
     ));
     assert_eq!(jobs.queue_depth(), 4);
     for id in &waiting {
-        assert_eq!(jobs.cancel(*id).unwrap().state, JobState::Canceled);
+        assert_eq!(jobs.cancel(*id).unwrap().state, JobState::Cancelled);
     }
     assert_eq!(jobs.queue_depth(), 1);
     jobs.cancel(running).unwrap();
     let job = wait(&jobs, running);
-    assert_eq!(job.state, JobState::Canceled);
+    assert_eq!(job.state, JobState::Cancelled);
     assert!(matches!(
         jobs.cancel(running),
         Err(JobError::Finished {
-            state: JobState::Canceled,
+            state: JobState::Cancelled,
             ..
         })
     ));

@@ -206,7 +206,7 @@ pub enum JobStateDto {
     /// Could not; `failure` says why.
     Failed,
     /// Was stopped on request.
-    Canceled,
+    Cancelled,
 }
 
 impl From<crate::model::JobState> for JobStateDto {
@@ -217,7 +217,7 @@ impl From<crate::model::JobState> for JobStateDto {
             JobState::Processing => Self::Processing,
             JobState::Succeeded => Self::Succeeded,
             JobState::Failed => Self::Failed,
-            JobState::Canceled => Self::Canceled,
+            JobState::Cancelled => Self::Cancelled,
         }
     }
 }

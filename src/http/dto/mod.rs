@@ -47,27 +47,33 @@ impl PageQuery {
         }
     }
 
-    /// The last item of the page before.
+    /// The last item of the page before, in the list of this name.
     ///
     /// # Errors
-    /// `invalid_cursor` where this service did not make it.
-    pub fn after<Id: FromStr>(&self) -> Result<Option<Id>, Problem> {
+    /// `invalid_cursor` where this list did not make it.
+    pub fn after<Id: FromStr>(&self, list: &str) -> Result<Option<Id>, Problem> {
         let Some(cursor) = &self.cursor else {
             return Ok(None);
         };
-        URL_SAFE_NO_PAD
-            .decode(cursor)
-            .ok()
-            .and_then(|bytes| String::from_utf8(bytes).ok()?.parse().ok())
+        let decoded = URL_SAFE_NO_PAD.decode(cursor).ok();
+        decoded
+            .and_then(|bytes| {
+                let text = String::from_utf8(bytes).ok()?;
+                let (made_by, id) = text.rsplit_once(CURSOR_SEPARATOR)?;
+                (made_by == list).then(|| id.parse().ok())?
+            })
             .map(Some)
             .ok_or_else(|| {
                 Problem::new(
                     Code::InvalidCursor,
-                    "the cursor is not one this service made; start again without it",
+                    "the cursor was not issued by this list; start again without it",
                 )
             })
     }
 }
+
+/// Between the list's name and the item's id in a cursor.
+const CURSOR_SEPARATOR: char = ' ';
 
 /// Part of a list.
 #[derive(Clone, Debug, Serialize, ToSchema)]
@@ -79,14 +85,21 @@ pub struct Page<T> {
 }
 
 impl<T> Page<T> {
-    /// Makes a page of up to `limit` items out of up to `limit + 1`: the one too many tells that there are more.
-    pub fn cut<S>(mut found: Vec<S>, limit: usize, id: impl Fn(&S) -> String, to: impl Fn(S) -> T) -> Self {
+    /// Makes a page of up to `limit` items of a list out of up to `limit + 1`: the one too many tells that there are
+    /// more. Its cursor is good for the list of this name only.
+    pub fn cut<S>(
+        list: &str,
+        mut found: Vec<S>,
+        limit: usize,
+        id: impl Fn(&S) -> String,
+        to: impl Fn(S) -> T,
+    ) -> Self {
         let more = found.len() > limit;
         found.truncate(limit);
         let next_cursor = found
             .last()
             .filter(|_| more)
-            .map(|last| URL_SAFE_NO_PAD.encode(id(last)));
+            .map(|last| URL_SAFE_NO_PAD.encode(format!("{list}{CURSOR_SEPARATOR}{}", id(last))));
         Self {
             items: found.into_iter().map(to).collect(),
             next_cursor,

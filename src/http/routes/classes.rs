@@ -54,12 +54,13 @@ pub async fn list_classes(
     State(state): State<AppState>,
     ApiQuery(page): ApiQuery<PageQuery>,
 ) -> Result<Json<Page<ClassDto>>, Problem> {
-    let (limit, after) = (page.limit()?, page.after::<ClassId>()?);
+    let (limit, after) = (page.limit()?, page.after::<ClassId>("classes")?);
     let found = state
         .blocking(move |s| Ok(s.store.list_classes(after, limit + 1)?))
         .await?;
     let live = state.jobs.live_index();
     Ok(Json(Page::cut(
+        "classes",
         found,
         limit,
         |class| class.id.to_string(),

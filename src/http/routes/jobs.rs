@@ -165,11 +165,12 @@ pub async fn list_jobs(
     State(state): State<AppState>,
     ApiQuery(page): ApiQuery<PageQuery>,
 ) -> Result<Json<Page<JobDto>>, Problem> {
-    let (limit, before) = (page.limit()?, page.after::<JobId>()?);
+    let (limit, before) = (page.limit()?, page.after::<JobId>("jobs")?);
     let found = state
         .blocking(move |s| Ok(s.jobs.list(before, limit + 1)?))
         .await?;
     Ok(Json(Page::cut(
+        "jobs",
         found,
         limit,
         |job| job.id.to_string(),

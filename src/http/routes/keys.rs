@@ -86,11 +86,12 @@ pub async fn list_keys(
     State(state): State<AppState>,
     ApiQuery(page): ApiQuery<PageQuery>,
 ) -> Result<Json<Page<KeyDto>>, Problem> {
-    let (limit, after) = (page.limit()?, page.after::<KeyId>()?);
+    let (limit, after) = (page.limit()?, page.after::<KeyId>("keys")?);
     let mut found = state.blocking(|s| Ok(s.store.api_keys()?)).await?;
     found.retain(|key| after.is_none_or(|after| key.id > after));
     let now = Timestamp::now();
     Ok(Json(Page::cut(
+        "keys",
         found,
         limit,
         |key| key.id.to_string(),

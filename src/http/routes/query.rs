@@ -38,6 +38,11 @@ use std::time::Duration;
         (Binary = "model/gltf+json"),
         (Binary = "model/gltf-binary"),
         (Binary = "model/stl"),
+        (Binary = "model/ply"),
+        (Binary = "model/off"),
+        (Binary = "application/zip"),
+        (Binary = "application/x-tar"),
+        (Binary = "application/gzip"),
         (FilesForm = "multipart/form-data"),
     )),
     responses((status = 200, description = "The ranking", body = QueryAnswer))

@@ -43,6 +43,8 @@ use tokio::io::AsyncReadExt;
         (Binary = "model/gltf+json"),
         (Binary = "model/gltf-binary"),
         (Binary = "model/stl"),
+        (Binary = "model/ply"),
+        (Binary = "model/off"),
         (Binary = "application/zip"),
         (Binary = "application/x-tar"),
         (Binary = "application/gzip"),
@@ -260,14 +262,22 @@ pub async fn list_shapes(
     ApiPath(class): ApiPath<String>,
     ApiQuery(page): ApiQuery<PageQuery>,
 ) -> Result<Json<Page<ShapeDto>>, Problem> {
-    let (limit, after) = (page.limit()?, page.after::<ShapeId>()?);
-    let found = state
+    let limit = page.limit()?;
+    let (list, found) = state
         .blocking(move |s| {
             let class = find_class(&s.store, &class)?;
-            Ok(s.store.list_shapes(class.id, after, limit + 1)?)
+            let list = format!("shapes of {}", class.id);
+            let after = page.after::<ShapeId>(&list)?;
+            Ok((list, s.store.list_shapes(class.id, after, limit + 1)?))
         })
         .await?;
-    Ok(Json(Page::cut(found, limit, |s| s.id.to_string(), Into::into)))
+    Ok(Json(Page::cut(
+        &list,
+        found,
+        limit,
+        |s| s.id.to_string(),
+        Into::into,
+    )))
 }
 
 /// Show a shape

@@ -58,11 +58,17 @@ pub async fn list_snapshots(
     State(state): State<AppState>,
     ApiQuery(page): ApiQuery<PageQuery>,
 ) -> Result<Json<Page<SnapshotDto>>, Problem> {
-    let (limit, after) = (page.limit()?, page.after::<SnapshotId>()?);
+    let (limit, after) = (page.limit()?, page.after::<SnapshotId>("snapshots")?);
     let found = state
         .blocking(move |s| Ok(s.store.list_snapshots(after, limit + 1)?))
         .await?;
-    Ok(Json(Page::cut(found, limit, |s| s.id.to_string(), Into::into)))
+    Ok(Json(Page::cut(
+        "snapshots",
+        found,
+        limit,
+        |s| s.id.to_string(),
+        Into::into,
+    )))
 }
 
 /// Show a snapshot
