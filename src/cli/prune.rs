@@ -83,7 +83,7 @@ pub fn prune(client: &Client, files: &[LabelledFile], confirm: ConfirmArgs) -> R
 fn content(file: &LabelledFile) -> Result<Content, CliError> {
     let mesh = MeshFile::load(&file.path, Limits::default().max_bytes)?;
     let hash = |bytes: &[u8]| blake3::hash(bytes).to_hex().to_string();
-    let companions = mesh.companions.iter().map(|c| hash(&c.bytes)).collect();
+    let companions = mesh.companions.iter().map(|c| hash(c.bytes())).collect();
     Ok((hash(&mesh.bytes), companions))
 }
 

@@ -160,7 +160,7 @@ fn the_catalogue_is_listed_changed_and_learnt_again() {
     answer(path, &[&["index", "shapes", "--data", "d"], &FAST[..]].concat());
     let service = Service::start(path, &["--data", "d"]);
     for target in [["--data", "d"], ["--server", service.url.as_str()]].iter().rev() {
-        let at = |args: &[&str]| [args, &target[..]].concat();
+        let at = |args: &[&'static str]| -> Vec<&str> { [args, &target[..]].concat() };
         if target[0] == "--data" {
             // One process uses a data directory at a time, and says how to reach the one that does.
             let (_, told) = ended(path, 1, &at(&["classes", "list"]));

@@ -14,6 +14,9 @@ use axum::Json;
 use axum::extract::State;
 use std::collections::BTreeMap;
 
+/// The list its cursors belong to.
+const LIST: &str = "index";
+
 /// Show the index
 ///
 /// The generation queries are answered from, and how the classes stand to it, a page of up to 1000 at a time.
@@ -26,7 +29,7 @@ pub async fn get_index(
     ApiQuery(query): ApiQuery<IndexQuery>,
 ) -> Result<Json<IndexAnswer>, Problem> {
     let page = PageQuery::from(query);
-    let (limit, after) = (page.limit()?, page.after::<ClassId>()?);
+    let (limit, after) = (page.limit()?, page.after::<ClassId>(LIST)?);
     let live = state.jobs.live_index();
     let classes = state.blocking(|s| all_classes(&s.store)).await?;
     let generation = live.generation.as_ref();
@@ -54,6 +57,7 @@ pub async fn get_index(
         .into_iter()
         .filter(|class| after.is_none_or(|after| class.id > after));
     let page = Page::cut(
+        LIST,
         found.take(limit + 1).collect(),
         limit,
         |class| class.id.to_string(),

@@ -234,6 +234,7 @@ impl<'s> Geometry<'s> {
         let mut drawn = TriangleSoup {
             vertices: Vec::new(),
             faces: std::mem::take(&mut self.faces),
+            resolution: 0.0,
         };
         match plan.mode {
             Mode::Triangles => drawn.faces.extend(corners.as_chunks::<3>().0),

@@ -154,7 +154,12 @@ impl<'s, 'd> Scene<'s, 'd> {
                 vertices: vertices.len().saturating_add(loose),
             });
         }
-        TriangleSoup { vertices, faces }.checked(self.document.format, self.document.limits)
+        let soup = TriangleSoup {
+            vertices,
+            faces,
+            resolution: 0.0,
+        };
+        soup.checked(self.document.format, self.document.limits)
     }
 
     /// The scene at rest as one soup. A mesh that is shown once gives its faces away instead of copying them.
@@ -173,7 +178,12 @@ impl<'s, 'd> Scene<'s, 'd> {
             .memory
             .grow(24 * self.vertices as u64 + 12 * self.faces as u64)?;
         let vertices = self.place(&self.nodes.rest())?;
-        TriangleSoup { vertices, faces }.checked(self.document.format, self.document.limits)
+        let soup = TriangleSoup {
+            vertices,
+            faces,
+            resolution: 0.0,
+        };
+        soup.checked(self.document.format, self.document.limits)
     }
 
     /// All vertices, placed.
