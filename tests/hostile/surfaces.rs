@@ -155,15 +155,6 @@ pub const CASES: &[fn() -> Case] = &[
     },
     || {
         (
-            "glTF nested deeply",
-            "model/gltf+json",
-            nested(),
-            422,
-            "malformed_mesh",
-        )
-    },
-    || {
-        (
             "glTF of numbers",
             "model/gltf+json",
             numbers(),
@@ -334,7 +325,11 @@ fn growing() -> Vec<u8> {
 
 /// Odd, but surfaces all the same.
 pub fn answerable() -> Vec<(&'static str, Vec<u8>)> {
-    vec![("edges from 1e-30 to 1e30", growing())]
+    // What is nested deeply has no shape, so it is passed over.
+    vec![
+        ("edges from 1e-30 to 1e30", growing()),
+        ("glTF nested deeply", nested()),
+    ]
 }
 
 /// Equal closed surfaces beside each other, of 162 vertices each.

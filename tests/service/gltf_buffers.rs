@@ -123,10 +123,7 @@ async fn instances_are_warned_of() {
         json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 0}}});
     document["buffers"][0]["uri"] = "x.bin".into();
     let text = document.to_string();
-    let files: [(&str, &[u8]); 2] = [
-        ("a.gltf", text.as_bytes()),
-        ("x.bin", &glb[json + 8..]),
-    ];
+    let files: [(&str, &[u8]); 2] = [("a.gltf", text.as_bytes()), ("x.bin", &glb[json + 8..])];
     let (media_type, body) = multipart(&files);
     let answer = app.post("/v1/query", &media_type, body.clone()).await;
     assert_eq!(answer.status, 200, "{}", answer.text());
