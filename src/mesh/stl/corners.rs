@@ -13,6 +13,8 @@ pub(super) struct Corners<'a> {
     context: &'a ReadContext,
     table: HashTable<u32>,
     hasher: RandomState,
+    /// Bytes reserved for the table.
+    held: u64,
 }
 
 fn key(point: &[f64; 3]) -> [u64; 3] {
@@ -27,6 +29,7 @@ impl<'a> Corners<'a> {
             context,
             table: HashTable::new(),
             hasher: RandomState::default(),
+            held: 0,
         }
     }
 
@@ -54,7 +57,6 @@ impl<'a> Corners<'a> {
 
     #[cold]
     fn grow(&mut self, vertices: &[[f64; 3]]) -> Result<(), MeshError> {
-        let before = self.table.allocation_size() as u64;
         let wanted = (2 * self.table.len()).max(1024);
         // A power of two of buckets, at most 7/8 full, with a byte beside each index.
         let after = ((wanted * 8 / 7 + 1).next_power_of_two() * (size_of::<u32>() + 1) + 32) as u64;
@@ -62,14 +64,15 @@ impl<'a> Corners<'a> {
         let more = wanted - self.table.len();
         self.table
             .reserve(more, |&k| self.hasher.hash_one(key(&vertices[k as usize])));
-        self.context.memory.shrink(before + after);
-        self.context.memory.grow(self.table.allocation_size() as u64)?;
+        self.context.memory.shrink(self.held);
+        self.held = after;
+        debug_assert!(self.table.allocation_size() as u64 <= after);
         Ok(())
     }
 }
 
 impl Drop for Corners<'_> {
     fn drop(&mut self) {
-        self.context.memory.shrink(self.table.allocation_size() as u64);
+        self.context.memory.shrink(self.held);
     }
 }
