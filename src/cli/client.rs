@@ -26,8 +26,8 @@ const CLOSE_WITHIN: Duration = Duration::from_secs(30);
 /// Where a command works.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct TargetArgs {
-    /// Data directory to work in; `keys` and `snapshot` ask the service that runs on it [default: shapelex-data]
-    #[arg(long, env = "SHAPELEX_DATA", value_name = "DIR")]
+    /// Data directory to work in, when no service runs on it [default: shapelex-data]
+    #[arg(long, env = "SHAPELEX_DATA", value_name = "DIR", conflicts_with = "server")]
     pub data: Option<std::path::PathBuf>,
     /// Running service to work with, such as http://127.0.0.1:7345
     #[arg(long, env = "SHAPELEX_SERVER", value_name = "URL")]
@@ -48,13 +48,29 @@ impl TargetArgs {
             None => Client::local(self.data.as_deref()),
         }
     }
+}
 
-    /// As [`client`](Self::client), for what only an operator may do. On a data directory that a service runs on it is
-    /// that service's client. Without an API key it brings the token that the service keeps in its data directory.
+/// Where a command works that only an operator may give.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct OperatorArgs {
+    /// Data directory to work in, or of the service to work with: its token is there [default: shapelex-data]
+    #[arg(long, env = "SHAPELEX_DATA", value_name = "DIR")]
+    pub data: Option<std::path::PathBuf>,
+    /// Running service to work with, such as http://127.0.0.1:7345
+    #[arg(long, env = "SHAPELEX_SERVER", value_name = "URL")]
+    pub server: Option<String>,
+    /// API key for a running service that asks for one; the environment keeps it out of the process list
+    #[arg(long, env = "SHAPELEX_API_KEY", value_name = "KEY", hide_env_values = true)]
+    pub api_key: Option<String>,
+}
+
+impl OperatorArgs {
+    /// Connects, or opens the data directory. On a directory that a service runs on it is that service's client. Without
+    /// an API key it brings the token that the service keeps in its data directory.
     ///
     /// # Errors
     /// As [`Client::remote`] and [`Client::local`].
-    pub fn operator_client(&self) -> Result<Client, CliError> {
+    pub fn client(&self) -> Result<Client, CliError> {
         let data = self.data.as_deref().unwrap_or(Path::new(DEFAULT_DATA));
         let access = || LocalAccess::read(data);
         if let Some(url) = &self.server {

@@ -1,7 +1,7 @@
 //! `shapelex keys`: who may use a service.
 
 use super::api::encode;
-use super::client::{Client, Payload, TargetArgs};
+use super::client::{Client, OperatorArgs, Payload};
 use super::{CliError, output};
 use jiff::{SignedDuration, Timestamp};
 use serde_json::{Map, Value, json};
@@ -20,7 +20,7 @@ pub enum KeysCommand {
     /// Make a key and print its secret, once
     Create(CreateArgs),
     /// List the keys, without their secrets
-    List(TargetArgs),
+    List(OperatorArgs),
     /// Make a key useless, at once and for good
     Revoke(RevokeArgs),
 }
@@ -48,7 +48,7 @@ pub struct CreateArgs {
     pub max_classes: Option<u64>,
     /// Where the keys are kept.
     #[command(flatten)]
-    pub target: TargetArgs,
+    pub target: OperatorArgs,
 }
 
 /// Arguments of `keys revoke`.
@@ -59,7 +59,7 @@ pub struct RevokeArgs {
     pub key: String,
     /// Where the keys are kept.
     #[command(flatten)]
-    pub target: TargetArgs,
+    pub target: OperatorArgs,
 }
 
 /// Runs the subcommand, on a data directory or a running service.
@@ -69,7 +69,7 @@ pub struct RevokeArgs {
 pub fn run(args: &KeysArgs, json: bool) -> Result<(), CliError> {
     match &args.command {
         KeysCommand::Create(args) => create(args, json),
-        KeysCommand::List(target) => list(&target.operator_client()?, json),
+        KeysCommand::List(target) => list(&target.client()?, json),
         KeysCommand::Revoke(args) => revoke(args, json),
     }
 }
@@ -101,7 +101,7 @@ fn create(args: &CreateArgs, json: bool) -> Result<(), CliError> {
     }
     let made = args
         .target
-        .operator_client()?
+        .client()?
         .call("POST", "/v1/keys", Payload::Json(Value::Object(body)))?;
     if json {
         return output::json(&made);
@@ -151,9 +151,7 @@ fn row(key: &Value) -> Vec<String> {
 
 fn revoke(args: &RevokeArgs, json: bool) -> Result<(), CliError> {
     let path = format!("/v1/keys/{}", encode(&args.key));
-    args.target
-        .operator_client()?
-        .call("DELETE", &path, Payload::Empty)?;
+    args.target.client()?.call("DELETE", &path, Payload::Empty)?;
     if json {
         output::json(&json!({ "revoked": args.key }))
     } else {

@@ -1,6 +1,6 @@
 //! `shapelex snapshot`: everything a service holds, as one file, and back.
 
-use super::client::{Client, Payload, TargetArgs};
+use super::client::{Client, OperatorArgs, Payload};
 use super::{CliError, output};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -23,13 +23,13 @@ pub enum SnapshotCommand {
         out: Option<PathBuf>,
         /// Where the data is.
         #[command(flatten)]
-        target: TargetArgs,
+        target: OperatorArgs,
     },
     /// List the snapshots there are
     List {
         /// Where the data is.
         #[command(flatten)]
-        target: TargetArgs,
+        target: OperatorArgs,
     },
     /// Save a snapshot to a file
     Download {
@@ -40,7 +40,7 @@ pub enum SnapshotCommand {
         out: PathBuf,
         /// Where the data is.
         #[command(flatten)]
-        target: TargetArgs,
+        target: OperatorArgs,
     },
     /// Replace everything there is by what a snapshot holds
     Restore {
@@ -49,7 +49,7 @@ pub enum SnapshotCommand {
         snapshot: String,
         /// Where the data goes; a data directory is made where there is none.
         #[command(flatten)]
-        target: TargetArgs,
+        target: OperatorArgs,
     },
     /// Delete a snapshot
     Delete {
@@ -57,7 +57,7 @@ pub enum SnapshotCommand {
         id: String,
         /// Where the data is.
         #[command(flatten)]
-        target: TargetArgs,
+        target: OperatorArgs,
     },
 }
 
@@ -68,7 +68,7 @@ pub enum SnapshotCommand {
 pub fn run(args: &SnapshotArgs, as_json: bool) -> Result<(), CliError> {
     match &args.command {
         SnapshotCommand::Create { out, target } => {
-            let client = target.operator_client()?;
+            let client = target.client()?;
             let made = client.call("POST", "/v1/snapshots", Payload::Empty)?;
             if let Some(out) = out {
                 client.download(text(&made, "file"), out)?;
@@ -78,16 +78,16 @@ pub fn run(args: &SnapshotArgs, as_json: bool) -> Result<(), CliError> {
                 format!("snapshot {}{}", describe(&made), saved.unwrap_or_default())
             })
         }
-        SnapshotCommand::List { target } => list(&target.operator_client()?, as_json),
+        SnapshotCommand::List { target } => list(&target.client()?, as_json),
         SnapshotCommand::Download { id, out, target } => {
-            let client = target.operator_client()?;
+            let client = target.client()?;
             let path = format!("/v1/snapshots/{}/file", super::api::encode(id));
             let bytes = client.download(&path, out)?;
             let told = json!({"file": out.display().to_string(), "bytes": bytes});
             tell(as_json, &told, || format!("{bytes} bytes in {}", out.display()))
         }
         SnapshotCommand::Restore { snapshot, target } => {
-            let client = target.operator_client()?;
+            let client = target.client()?;
             let file = PathBuf::from(snapshot);
             let restored = if file.is_file() {
                 client.send_file("/v1/snapshots/restore", "application/zstd", &file)?
@@ -107,7 +107,7 @@ pub fn run(args: &SnapshotArgs, as_json: bool) -> Result<(), CliError> {
         }
         SnapshotCommand::Delete { id, target } => {
             let path = format!("/v1/snapshots/{}", super::api::encode(id));
-            target.operator_client()?.call("DELETE", &path, Payload::Empty)?;
+            target.client()?.call("DELETE", &path, Payload::Empty)?;
             tell(as_json, &json!({ "deleted": id }), || format!("deleted {id}"))
         }
     }
