@@ -63,7 +63,7 @@ fn coding(criterion: &mut Criterion) {
             continue;
         };
         group.bench_function(format!("dictionary/{name}"), |bencher| {
-            bencher.iter(|| black_box(Dictionary::new(dictionary.atoms().clone())));
+            bencher.iter(|| black_box(Dictionary::new(dictionary.atoms().into_owned())));
         });
         for lambda in [0.5, 0.05] {
             group.bench_function(format!("encode/{name}/{lambda}"), |bencher| {

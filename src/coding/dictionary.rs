@@ -249,3 +249,49 @@ impl Drop for Single {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cancel::Cancel;
+    use crate::coding::encode;
+
+    /// 40 atoms of 24 values at single precision.
+    fn atoms() -> Vec<f32> {
+        let value = |i: usize, j: usize| ((i * (j + 2)) as f32 * 0.37).sin() / 6.0;
+        (0..40).flat_map(|j| (0..24).map(move |i| value(i, j))).collect()
+    }
+
+    #[test]
+    fn kept_atoms_code_as_whole_ones_with_and_without_room() {
+        let values = atoms();
+        let whole = Mat::from_fn(24, 40, |i, j| f64::from(values[j * 24 + i]));
+        let whole = Dictionary::new(whole).unwrap();
+        let signals = Mat::from_fn(24, 200, |i, j| ((i * 7 + j * 3) as f64 * 0.11).cos() / 3.0);
+        let codes =
+            |dictionary: &Dictionary| encode(dictionary, signals.as_ref(), 0.05, &Cancel::new()).unwrap();
+        let bytes = prepared_bytes(24, 40);
+        let room = PreparedRoom::new(bytes + bytes / 2);
+        let single = || Dictionary::single(values.clone(), 24, &room).unwrap();
+        let (first, second) = (single(), single());
+        assert_eq!(first.resident_bytes(), 4 * 24 * 40);
+        assert_eq!(codes(&first), codes(&whole));
+        assert_eq!(codes(&second), codes(&whole));
+        assert_eq!(first.resident_bytes(), 4 * 24 * 40 + bytes, "it is kept");
+        assert_eq!(second.resident_bytes(), 4 * 24 * 40, "there was no room");
+        assert_eq!(*second.atoms(), *whole.atoms());
+        // Its room is free again for another.
+        drop(first);
+        codes(&second);
+        assert_eq!(second.resident_bytes(), 4 * 24 * 40 + bytes);
+    }
+
+    #[test]
+    fn atoms_that_are_none_are_refused() {
+        let room = PreparedRoom::new(0);
+        assert!(Dictionary::single(vec![0.5; 7], 2, &room).is_err());
+        assert!(Dictionary::single(vec![0.5; 4], 0, &room).is_err());
+        assert!(Dictionary::single(vec![2.0; 4], 2, &room).is_err());
+        assert!(Dictionary::single(vec![f32::NAN; 4], 2, &room).is_err());
+    }
+}
