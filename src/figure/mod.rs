@@ -24,6 +24,8 @@ pub mod precision_recall;
 mod render;
 pub mod results;
 mod ticks;
+mod vector;
+mod visibility;
 
 pub use accuracy::{ClassAccuracy, class_accuracy};
 pub use bars::{Bar, bars};

@@ -1,11 +1,11 @@
 //! A mesh → the triangles of it that are seen, shaded, from behind to front.
 
 use super::FigureError;
+use super::vector::{Vector, cross, dot, minus, unit};
+use super::visibility::seen_faces;
 use crate::mesh::TriMesh;
 use crate::mesh::boundary::boundary_vertices;
 use faer::{Mat, Side};
-
-type Vector = [f64; 3];
 
 /// Turned about the upright axis, so that a side view shows depth; 25°.
 const YAW: f64 = 0.436;
@@ -133,7 +133,7 @@ fn feet(centred: &[Vector], up: &Vector) -> f64 {
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// The triangles that own at least one pixel and those around them that face the same way, the farthest first.
+/// The triangles that own at least one pixel and those that may be seen between them, the farthest first.
 /// `resolution` is the number of pixels per unit.
 ///
 /// A triangle thinner than a pixel owns none and would be missed as a slit, through which the background shines.
@@ -141,7 +141,7 @@ pub(super) fn facets(mesh: &TriMesh, frame: &Frame, resolution: f64) -> Vec<Face
     let seen: Vec<Vector> = mesh.vertices().iter().map(|p| frame.see(p)).collect();
     let open = boundary_vertices(mesh).contains(&true);
     let outward = if volume(mesh) < 0.0 { -1.0 } else { 1.0 };
-    let visible = with_neighbours(&seen, mesh.faces(), visible(&seen, mesh.faces(), resolution));
+    let visible = seen_faces(&seen, mesh.faces(), resolution, (!open).then_some(outward));
     let mut found: Vec<(f64, Facet)> = mesh
         .faces()
         .iter()
@@ -164,33 +164,6 @@ pub(super) fn facets(mesh: &TriMesh, frame: &Frame, resolution: f64) -> Vec<Face
     found.into_iter().map(|(_, facet)| facet).collect()
 }
 
-/// Whether a triangle shows the viewer the side its corners run around counterclockwise.
-fn faces_viewer(seen: &[Vector], face: &[u32; 3]) -> bool {
-    let [a, b, c] = face.map(|v| seen[v as usize]);
-    cross(&minus(&b, &a), &minus(&c, &a))[2] >= 0.0
-}
-
-/// The visible triangles, and those that share a corner with one and face the same way.
-fn with_neighbours(seen: &[Vector], faces: &[[u32; 3]], visible: Vec<bool>) -> Vec<bool> {
-    // Per vertex: whether it belongs to a visible triangle that faces away, and towards the viewer.
-    let mut touched = vec![[false; 2]; seen.len()];
-    for (face, _) in faces.iter().zip(&visible).filter(|(_, visible)| **visible) {
-        let side = usize::from(faces_viewer(seen, face));
-        for &v in face {
-            touched[v as usize][side] = true;
-        }
-    }
-    let near = |face: &[u32; 3]| {
-        let side = usize::from(faces_viewer(seen, face));
-        face.iter().any(|&v| touched[v as usize][side])
-    };
-    faces
-        .iter()
-        .zip(visible)
-        .map(|(face, visible)| visible || near(face))
-        .collect()
-}
-
 /// Six times the enclosed volume; for an open surface its sign still tells outside from inside, mostly.
 fn volume(mesh: &TriMesh) -> f64 {
     let v = mesh.vertices();
@@ -203,90 +176,9 @@ fn volume(mesh: &TriMesh) -> f64 {
         .sum()
 }
 
-/// Which faces are nearest to the viewer at some pixel's centre, or at their own.
-fn visible(seen: &[Vector], faces: &[[u32; 3]], resolution: f64) -> Vec<bool> {
-    let bound =
-        |axis: usize, pick: fn(f64, f64) -> f64| seen.iter().map(|p| p[axis]).reduce(pick).unwrap_or(0.0);
-    let (left, low) = (bound(0, f64::min), bound(1, f64::min));
-    let cells = |from: f64, to: f64| ((to - from) * resolution).clamp(0.0, 2000.0) as usize + 1;
-    let (columns, rows) = (cells(left, bound(0, f64::max)), cells(low, bound(1, f64::max)));
-    let mut depth = vec![f64::NEG_INFINITY; columns * rows];
-    let mut owner = vec![usize::MAX; columns * rows];
-    for (i, face) in faces.iter().enumerate() {
-        let corners = face.map(|v| {
-            let p = seen[v as usize];
-            [(p[0] - left) * resolution, (p[1] - low) * resolution, p[2]]
-        });
-        let range = |axis: usize, cells: usize| {
-            let values = corners.map(|c| c[axis]);
-            let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-            let most = values.iter().copied().fold(0.0, f64::max);
-            (least.max(0.0) as usize).min(cells - 1)..=(most as usize).min(cells - 1)
-        };
-        let mut claim = |x: usize, y: usize, z: f64| {
-            let at = y * columns + x;
-            if z > depth[at] {
-                depth[at] = z;
-                owner[at] = i;
-            }
-        };
-        for y in range(1, rows) {
-            for x in range(0, columns) {
-                if let Some(z) = height_at(&corners, x as f64 + 0.5, y as f64 + 0.5) {
-                    claim(x, y, z);
-                }
-            }
-        }
-        let centre: Vector = std::array::from_fn(|k| corners.iter().map(|c| c[k]).sum::<f64>() / 3.0);
-        claim(
-            (centre[0] as usize).min(columns - 1),
-            (centre[1] as usize).min(rows - 1),
-            centre[2],
-        );
-    }
-    let mut visible = vec![false; faces.len()];
-    for i in owner.into_iter().filter(|&i| i != usize::MAX) {
-        visible[i] = true;
-    }
-    visible
-}
-
-/// The third coordinate of a triangle over a point of the first two; `None` outside of it or where it is seen edge-on.
-fn height_at(corners: &[Vector; 3], x: f64, y: f64) -> Option<f64> {
-    let [a, b, c] = corners;
-    let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
-    let part = |p: &Vector, q: &Vector| ((p[0] - x) * (q[1] - y) - (q[0] - x) * (p[1] - y)) / area;
-    let (u, v, w) = (part(b, c), part(c, a), part(a, b));
-    (area != 0.0 && u >= 0.0 && v >= 0.0 && w >= 0.0).then(|| u * a[2] + v * b[2] + w * c[2])
-}
-
-fn dot(a: &Vector, b: &Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn minus(a: &Vector, b: &Vector) -> Vector {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn cross(a: &Vector, b: &Vector) -> Vector {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-fn unit(a: &Vector) -> Vector {
-    let length = dot(a, a).sqrt();
-    if length > 0.0 {
-        a.map(|x| x / length)
-    } else {
-        [0.0, 0.0, 1.0]
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::visibility::height_at;
     use super::*;
 
     /// A box of 4 × 2 × 1 with one corner at the origin.

@@ -20,15 +20,27 @@ pub(super) enum Quantity {
     Share,
 }
 
-/// About as many ticks as are aimed at, at multiples of 1, 2 or 5 times a power of ten within the range.
-pub(super) fn linear((low, high): (f64, f64), aim: usize, quantity: Quantity) -> Vec<Tick> {
+/// About as many ticks as are aimed at, at multiples of 1, 2 or 5 times a power of ten within the range; more where
+/// there would be only one.
+pub(super) fn linear(range: (f64, f64), aim: usize, quantity: Quantity) -> Vec<Tick> {
+    let tries = aim.max(1)..=aim + 6;
+    let found = tries.map(|aim| divided(range, aim, quantity));
+    let enough = |ticks: &Vec<Tick>| ticks.len() >= 2;
+    found
+        .clone()
+        .find(enough)
+        .or_else(|| found.last())
+        .unwrap_or_default()
+}
+
+fn divided((low, high): (f64, f64), aim: usize, quantity: Quantity) -> Vec<Tick> {
     let unit = if quantity == Quantity::Share { 100.0 } else { 1.0 };
     let (low, high) = (low * unit, high * unit);
     let finite = low.is_finite() && high.is_finite() && high > low;
     if !finite {
         return Vec::new();
     }
-    let mut step = step((high - low) / aim.max(1) as f64);
+    let mut step = step((high - low) / aim as f64);
     if quantity == Quantity::Count {
         step = step.max(1.0);
     }

@@ -159,25 +159,20 @@ fn the_catalogue_is_listed_changed_and_learnt_again() {
     small_zoo(path);
     answer(path, &[&["index", "shapes", "--data", "d"], &FAST[..]].concat());
     let service = Service::start(path, &["--data", "d"]);
-    for target in [["--data", "d"], ["--server", service.url.as_str()]].iter().rev() {
-        let at = |args: &[&'static str]| -> Vec<&str> { [args, &target[..]].concat() };
-        if target[0] == "--data" {
-            // One process uses a data directory at a time, and says how to reach the one that does.
-            let (_, told) = ended(path, 1, &at(&["classes", "list"]));
-            assert!(
-                told.contains("another process") && told.contains("--server"),
-                "{told}"
-            );
-            break;
-        }
-        catalogue(path, &at);
-        assert_eq!(
-            requests(&service.url, "get_job"),
-            2,
-            "`jobs show` and `cancel`; a job is followed, not asked for"
-        );
-        assert!(requests(&service.url, "follow_job") >= 3);
-    }
+    let url: &'static str = service.url.clone().leak();
+    catalogue(path, &|args| [args, &["--server", url]].concat());
+    assert_eq!(
+        requests(url, "get_job"),
+        2,
+        "`jobs show` and `cancel`; a job is followed, not asked for"
+    );
+    assert!(requests(url, "follow_job") >= 3);
+    // One process uses a data directory at a time, and says how to reach the one that does.
+    let (_, told) = ended(path, 1, &["classes", "list", "--data", "d"]);
+    assert!(
+        told.contains("another process") && told.contains("--server"),
+        "{told}"
+    );
     assert!(service.terminate().success());
     small_zoo(path);
     answer(path, &["index", "shapes", "--data", "d"]);
@@ -206,8 +201,8 @@ fn requests(url: &str, operation: &str) -> u64 {
 }
 
 /// Every command, at a place that holds the small zoo.
-fn catalogue<'a>(path: &Path, at: &dyn Fn(&[&'a str]) -> Vec<&'a str>) {
-    let say = |args: &[&'a str]| answer(path, &at(args));
+fn catalogue(path: &Path, at: &dyn Fn(&[&'static str]) -> Vec<&'static str>) {
+    let say = |args: &[&'static str]| answer(path, &at(args));
     let names = classes(path);
     let (first, second, third): (&'static str, &'static str, &'static str) = (
         names[0].clone().leak(),
