@@ -266,7 +266,8 @@ impl<'a> Patch<'a> {
             if folded.iter().any(|f| !self.is_sliver(*f)) {
                 return Outcome::Blocked;
             }
-            if between.len() > folded.len() && allowed == Allowed::Manifold {
+            // Of the two halves each that is folded vanishes together with its twin.
+            if between.len() > 2 * folded.len() && allowed == Allowed::Manifold {
                 return Outcome::Blocked;
             }
             twins.extend(folded);
