@@ -3,6 +3,7 @@
 use super::components::{Selection, select};
 use super::noise::weld_noise;
 use super::repair::{repair, slivers};
+use super::sliver::may_be_sliver;
 use super::sort::sort;
 use super::trimesh::face_area;
 use super::weld::weld;
@@ -173,27 +174,14 @@ fn filter_faces(
     report: &mut PrepareReport,
     work: Work,
 ) -> Result<Vec<f64>, MeshError> {
-    let before = faces.len();
-    if !slivers(vertices, faces, work)?.is_empty() {
-        faces.retain(|f| f[0] != f[1] && f[1] != f[2] && f[2] != f[0]);
-        report.degenerate_faces = before - faces.len();
-        let duplicate = duplicates(vertices.len(), faces, work)?;
-        let mut i = 0;
-        faces.retain(|_| {
-            i += 1;
-            !duplicate[i - 1]
-        });
-        report.duplicate_faces = before - report.degenerate_faces - faces.len();
-        let repaired = repair(vertices, faces, work)?;
-        report.repaired_faces = repaired.joined;
-        report.degenerate_faces += repaired.loose;
-    }
-    let before = faces.len();
     let mut areas = Vec::with_capacity(faces.len());
-    for (i, f) in faces.iter().enumerate() {
-        work.look(i)?;
-        areas.push(proper_area(vertices, f));
+    if measure(vertices, faces, &mut areas, work)? == Thin::Some
+        && !slivers(vertices, faces, work)?.is_empty()
+    {
+        take_out_slivers(vertices, faces, report, work)?;
+        measure(vertices, faces, &mut areas, work)?;
     }
+    let before = faces.len();
     let threshold = NO_AREA * areas.iter().sum::<f64>();
     retain(faces, &mut areas, |_, _, area| area > 0.0 && area >= threshold);
     report.degenerate_faces += before - faces.len();
@@ -207,18 +195,75 @@ fn filter_faces(
     Ok(areas)
 }
 
+/// Drops faces with a repeated vertex and duplicates, then takes out slivers.
+fn take_out_slivers(
+    vertices: &[[f64; 3]],
+    faces: &mut Vec<[u32; 3]>,
+    report: &mut PrepareReport,
+    work: Work,
+) -> Result<(), MeshError> {
+    let before = faces.len();
+    faces.retain(|f| f[0] != f[1] && f[1] != f[2] && f[2] != f[0]);
+    report.degenerate_faces = before - faces.len();
+    let duplicate = duplicates(vertices.len(), faces, work)?;
+    let mut i = 0;
+    faces.retain(|_| {
+        i += 1;
+        !duplicate[i - 1]
+    });
+    report.duplicate_faces = before - report.degenerate_faces - faces.len();
+    let repaired = repair(vertices, faces, work)?;
+    report.repaired_faces = repaired.joined;
+    report.degenerate_faces += repaired.loose;
+    Ok(())
+}
+
+/// Whether faces with three different vertices are thin enough to be looked at as slivers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Thin {
+    None,
+    Some,
+}
+
+/// Fills in the areas of the faces.
+fn measure(
+    vertices: &[[f64; 3]],
+    faces: &[[u32; 3]],
+    areas: &mut Vec<f64>,
+    work: Work,
+) -> Result<Thin, MeshError> {
+    areas.clear();
+    let mut thin = Thin::None;
+    for (i, f) in faces.iter().enumerate() {
+        work.look(i)?;
+        let (area, of_face) = proper_area(vertices, f);
+        areas.push(area);
+        if of_face == Thin::Some {
+            thin = Thin::Some;
+        }
+    }
+    Ok(thin)
+}
+
 /// Area of a face, or 0 where a vertex is repeated or the three are collinear up to rounding.
-fn proper_area(vertices: &[[f64; 3]], f: &[u32; 3]) -> f64 {
+fn proper_area(vertices: &[[f64; 3]], f: &[u32; 3]) -> (f64, Thin) {
     if f[0] == f[1] || f[1] == f[2] || f[2] == f[0] {
-        return 0.0;
+        return (0.0, Thin::None);
     }
     let area = face_area(vertices, f);
     let square = |a: u32, b: u32| {
         let (a, b) = (&vertices[a as usize], &vertices[b as usize]);
         (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum::<f64>()
     };
-    let longest = square(f[0], f[1]).max(square(f[1], f[2])).max(square(f[2], f[0]));
-    if area > COLLINEAR * longest { area } else { 0.0 }
+    let edges = [square(f[0], f[1]), square(f[1], f[2]), square(f[2], f[0])];
+    let longest = edges[0].max(edges[1]).max(edges[2]);
+    let shortest = edges[0].min(edges[1]).min(edges[2]);
+    let thin = if may_be_sliver(area, shortest, longest) {
+        Thin::Some
+    } else {
+        Thin::None
+    };
+    (if area > COLLINEAR * longest { area } else { 0.0 }, thin)
 }
 
 fn retain(
@@ -267,7 +312,9 @@ pub(super) fn duplicates(
     let mut entries: Vec<(u64, u32)> = Vec::new();
     for v in 0..vertex_count {
         work.look(v)?;
-        let bucket = &bucketed[start[v] as usize..start[v + 1] as usize];
+        let (from, to) = (start[v] as usize, start[v + 1] as usize);
+        work.pass(from, to)?;
+        let bucket = &bucketed[from..to];
         if bucket.len() < 2 {
             continue;
         }

@@ -79,7 +79,9 @@ pub(super) fn for_each_edge<W: Watch>(
     let mut group = Vec::new();
     for v in 0..vertex_count {
         watch.look(v)?;
-        let bucket = &mut entries[start[v] as usize..start[v + 1] as usize];
+        let (from, to) = (start[v] as usize, start[v + 1] as usize);
+        watch.pass(from, to)?;
+        let bucket = &mut entries[from..to];
         if bucket.len() < LARGE_BUCKET {
             bucket.sort_unstable();
         } else {

@@ -1,6 +1,7 @@
 //! The faces around slivers, and the two changes that take a sliver out.
 
 use super::MeshError;
+use super::boundary::distance;
 use super::sliver::{Shape, shape};
 use super::work::{Watch, Work};
 use crate::memory::Held;
@@ -248,11 +249,12 @@ impl<'a> Patch<'a> {
             return Outcome::Loose;
         }
         let others: Vec<u32> = base.into_iter().filter(|f| *f != cap).collect();
+        let apexes: Vec<u32> = others.iter().filter_map(|f| self.apex(*f, a, b)).collect();
+        if !self.is_progress([a, b], corner, &apexes) {
+            return Outcome::Blocked;
+        }
         let mut twins = Vec::new();
-        for &other in &others {
-            let Some(apex) = self.apex(other, a, b) else {
-                return Outcome::Blocked;
-            };
+        for &apex in &apexes {
             let Some(between) = self.sharing(corner, apex) else {
                 return Outcome::Blocked;
             };
@@ -264,7 +266,8 @@ impl<'a> Patch<'a> {
             if folded.iter().any(|f| !self.is_sliver(*f)) {
                 return Outcome::Blocked;
             }
-            if between.len() > folded.len() && allowed == Allowed::Manifold {
+            // Of the two halves each that is folded vanishes together with its twin.
+            if between.len() > 2 * folded.len() && allowed == Allowed::Manifold {
                 return Outcome::Blocked;
             }
             twins.extend(folded);
@@ -274,6 +277,20 @@ impl<'a> Patch<'a> {
             self.split(other, [a, b], corner, &twins);
         }
         Outcome::Joined
+    }
+
+    /// Whether there are fewer caps after the faces of an edge have been split at the corner of a cap, or as many with
+    /// shorter edges. Needles do not count, as closing one leaves a vertex less: so this comes to an end.
+    fn is_progress(&self, [a, b]: [u32; 2], corner: u32, apexes: &[u32]) -> bool {
+        let is_cap = |f: [u32; 3]| usize::from(matches!(shape(&self.vertices, &f).0, Shape::Cap { .. }));
+        let before: usize = 1 + apexes.iter().map(|d| is_cap([a, b, *d])).sum::<usize>();
+        let after: usize = apexes
+            .iter()
+            .map(|d| is_cap([a, corner, *d]) + is_cap([corner, b, *d]))
+            .sum();
+        let length = |v: u32, w: u32| distance(&self.vertices[v as usize], &self.vertices[w as usize]);
+        let shorter = apexes.iter().all(|d| length(corner, *d) < length(a, b));
+        after < before || (after == before && shorter)
     }
 
     /// Splits a face at a corner on its edge. A half that is there already vanishes together with it.

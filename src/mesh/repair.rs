@@ -67,25 +67,29 @@ pub(super) fn repair(
     faces: &mut Vec<[u32; 3]>,
     work: Work,
 ) -> Result<Repaired, MeshError> {
-    let mut repaired = Repaired::default();
+    let mut left = slivers(vertices, faces, work)?;
+    let found = left.len();
+    let mut loose = 0;
     for _ in 0..ROUNDS {
-        let found = slivers(vertices, faces, work)?;
-        if found.is_empty() {
+        if left.is_empty() {
             break;
         }
-        let Some(mut patch) = Patch::around(vertices, faces, &found, work)? else {
+        let Some(mut patch) = Patch::around(vertices, faces, &left, work)? else {
             break;
         };
-        let before = repaired;
-        patch.run(|outcome| match outcome {
-            Outcome::Joined => repaired.joined += 1,
-            Outcome::Loose => repaired.loose += 1,
-            Outcome::Blocked => {}
+        let mut steps = 0;
+        patch.run(|outcome| {
+            steps += 1;
+            loose += usize::from(outcome == Outcome::Loose);
         })?;
         patch.finish(faces);
-        if repaired == before {
+        left = slivers(vertices, faces, work)?;
+        if steps == 0 {
             break;
         }
     }
-    Ok(repaired)
+    Ok(Repaired {
+        joined: found.saturating_sub(loose + left.len()),
+        loose,
+    })
 }

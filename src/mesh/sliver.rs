@@ -21,15 +21,20 @@ pub(super) enum Shape {
     Needle { edge: [u32; 2] },
 }
 
-/// The kind of a face with three different vertices, and the square of its longest edge.
-pub(super) fn shape(vertices: &[[f64; 3]], face: &[u32; 3]) -> (Shape, f64) {
+/// Whether a face may be a sliver, by its area and the squares of its shortest and longest edge: none other is.
+pub(super) fn may_be_sliver(area: f64, shortest: f64, longest: f64) -> bool {
     /// Rounding is much less than this.
     const CLEARLY: f64 = 2.0;
+    shortest <= CLEARLY * NEEDLE * NEEDLE * longest || 2.0 * area <= CLEARLY * CAP * longest
+}
+
+/// The kind of a face with three different vertices, and the square of its longest edge.
+pub(super) fn shape(vertices: &[[f64; 3]], face: &[u32; 3]) -> (Shape, f64) {
     let measures = Measures::of(face.map(|v| vertices[v as usize]));
     let (shortest, longest) = (measures.squares[measures.short], measures.squares[measures.long]);
-    let needle = shortest <= CLEARLY * NEEDLE * NEEDLE * longest;
-    let cap = measures.height <= CLEARLY * CAP * CAP * longest;
-    if needle || cap {
+    // The height is twice the area over the longest edge.
+    let area = 0.5 * (measures.height * longest).sqrt();
+    if may_be_sliver(area, shortest, longest) {
         (thin_shape(vertices, face), longest)
     } else {
         (Shape::Sound, longest)

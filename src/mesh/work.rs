@@ -18,6 +18,14 @@ pub(super) trait Watch {
     /// To be called at each step of a loop; `Err` once a stop was asked for.
     fn look(&self, step: usize) -> Result<(), Self::Error>;
 
+    /// As [`look`](Self::look), for a loop whose steps differ in length: the work done before and after one.
+    fn pass(&self, before: usize, after: usize) -> Result<(), Self::Error> {
+        if before / STRIDE == after / STRIDE {
+            return Ok(());
+        }
+        self.look(0)
+    }
+
     /// Reserves `bytes` for each of `count` elements until the guard is dropped.
     fn hold(&self, count: usize, bytes: usize) -> Result<Self::Held, Self::Error>;
 }

@@ -107,6 +107,11 @@ async fn each_is_answered_with_its_problem() {
 
 /// Meshes just below the limits of size: answered, or refused by name, in 5 s of processor time and 512 MB.
 async fn large_surfaces(app: &App) {
+    let mut parameters = small();
+    parameters["working_size"] = json!(2000);
+    parameters["components"] = json!("largest");
+    let job = app.reindex(json!({"parameters": parameters})).await;
+    assert_eq!(job["state"], "succeeded", "{job}");
     let mut wrong = Vec::new();
     for make in large::CASES {
         let (what, media_type, body, expected) = make();
