@@ -13,11 +13,10 @@ use super::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
 use crate::mesh::TriangleSoup;
 use crate::model::ClassId;
-use crate::parameters::Parameters;
+use crate::pipeline::estimate::{self, Role};
 use crate::pipeline::prepared::OPEN_ABOVE;
 use crate::pipeline::{Stage, StageSpan, describe_plain, describe_query, rank, rank_top};
 use crate::ranking::{Index, SIGNIFICANCE};
-use crate::spectral;
 use crate::store::StoreError;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -48,16 +47,16 @@ pub fn answer(
     let watch = Stopwatch::default();
     let observer = |stage| watch.begin(stage);
     observer(Stage::Read);
-    let reserved = state.memory.reservation();
-    reserved.grow(mesh.reading_bytes())?;
-    let (format, soup) = mesh.read(&state.config.limits)?;
-    // Held beside each other, since preparing, which the reading is reserved for, is a part of describing.
-    reserved.grow(spectrum_bytes(&soup, parameters))?;
     let stop = limit.map_or(&work.cancel, |limit| &limit.over);
     let timely = |problem: Problem| match limit {
         Some(limit) if problem.code == Code::Cancelled => limit.nothing_scored(),
         _ => problem,
     };
+    let context = mesh.context(state.config.limits, stop);
+    let (format, soup) = mesh.read(&context).map_err(timely)?;
+    context
+        .memory
+        .grow(computing_bytes(&soup, &index, state.config.query_threads))?;
     let named = options.rank_by.unwrap_or(parameters.rank_by.into());
     let (description, ranking, left) = match named.method() {
         Ok(rank_by) => {
@@ -94,7 +93,7 @@ pub fn answer(
             (description, Ranked::from(nearest), Vec::new())
         }
     };
-    drop(reserved);
+    drop(context);
     let stages = watch.end();
     for (stage, took) in &stages {
         metrics::time_stage(*stage, *took);
@@ -160,14 +159,25 @@ pub fn answer(
     })
 }
 
-/// Memory the spectrum takes, in bytes, by the size the mesh is simplified to.
-fn spectrum_bytes(soup: &TriangleSoup, parameters: &Parameters) -> u64 {
-    let vertices = match parameters.working_size {
-        0 => soup.vertices.len(),
-        // Closing holes adds a vertex for each.
-        size => soup.vertices.len().min(size.saturating_mul(2)),
-    };
-    spectral::estimated_bytes(vertices, parameters.eigenpairs) as u64
+/// Memory that describing and ranking a mesh takes beside the mesh itself, in bytes.
+fn computing_bytes(soup: &TriangleSoup, index: &Index, threads: usize) -> u64 {
+    let (vertices, parameters) = (soup.vertices.len(), &index.parameters);
+    let largest = (index.classes.iter())
+        .flat_map(|class| class.dictionaries.values())
+        .map(|dictionary| dictionary.len())
+        .max();
+    let preparing = estimate::preparing_bytes(vertices, soup.faces.len());
+    let describing = estimate::describing_bytes(vertices, parameters, Role::Query);
+    let ranking = estimate::ranking_bytes(vertices, largest.unwrap_or(0), threads, parameters);
+    // Views are held while they are ranked, and the spectra are gone then.
+    preparing.max(describing).max(
+        ranking
+            + estimate::description_bytes(
+                estimate::prepared_vertices(vertices, parameters),
+                parameters,
+                Role::Query,
+            ),
+    )
 }
 
 /// The index without the classes that were deleted since it was learnt, and the names the others have now.

@@ -1,10 +1,13 @@
 //! axum's extractors with problems for rejections.
 
+use super::arriving::Arriving;
+use super::body::{body_too_large, broke_off, no_room, within};
 use super::problem::{Code, Problem};
-use super::upload::body_too_large;
+use super::request_memory;
 use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::header;
 use axum::http::request::Parts;
+use futures_util::StreamExt;
 use serde::de::DeserializeOwned;
 use std::time::Duration;
 
@@ -73,18 +76,7 @@ async fn body(request: Request) -> Result<bytes::Bytes, Problem> {
         .headers()
         .get(header::CONTENT_TYPE)
         .map(|v| String::from_utf8_lossy(v.as_bytes()).to_ascii_lowercase());
-    let receiving = axum::body::to_bytes(request.into_body(), MAX_JSON_BYTES);
-    let bytes = tokio::time::timeout(JSON_WITHIN, receiving)
-        .await
-        .map_err(|_| {
-            let seconds = JSON_WITHIN.as_secs();
-            Problem::new(
-                Code::RequestTimeout,
-                format!("the body did not arrive within {seconds} s"),
-            )
-            .with("limit_seconds", seconds)
-        })?
-        .map_err(|_| body_too_large(MAX_JSON_BYTES))?;
+    let bytes = within(JSON_WITHIN, receive(request)).await?;
     let essence = media_type
         .as_deref()
         .map(|t| t.split(';').next().unwrap_or_default().trim());
@@ -96,6 +88,21 @@ async fn body(request: Request) -> Result<bytes::Bytes, Problem> {
             format!("'{other}' is not read here; send application/json"),
         )),
     }
+}
+
+/// A body of at most [`MAX_JSON_BYTES`], counted as memory of the request.
+async fn receive(request: Request) -> Result<bytes::Bytes, Problem> {
+    let memory = request_memory::of(&request)?;
+    let mut body = Arriving::new(MAX_JSON_BYTES, &memory);
+    let mut pieces = request.into_body().into_data_stream();
+    while let Some(piece) = pieces.next().await {
+        let piece = piece.map_err(broke_off)?;
+        if body.len() + piece.len() > MAX_JSON_BYTES {
+            return Err(body_too_large(MAX_JSON_BYTES));
+        }
+        body.push(&piece).map_err(no_room)?;
+    }
+    Ok(body.into_bytes())
 }
 
 fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {

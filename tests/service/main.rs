@@ -4,6 +4,7 @@
 mod bad_input;
 mod baselines;
 mod batch;
+mod bodies;
 mod catalogue;
 mod connections;
 mod contract;

@@ -173,21 +173,22 @@ async fn begin(
         }
     }
     let left = state.limits.take_queries(caller, 1)?;
-    let upload = upload::receive(
-        request,
-        options.name.clone(),
-        state.config.upload_limits(),
-        state.config.upload_timeout,
-    )
-    .await?;
-    let live = state.jobs.live_index();
+    answerable(state)?;
+    let upload = upload::receive(state, request, options.name.clone()).await?;
+    // What was switched in while the body arrived.
+    Ok((answerable(state)?, upload, left))
+}
+
+/// The index there is now.
+fn answerable(state: &AppState) -> Result<Arc<LiveIndex>, Problem> {
     if state.store.recovery_mode().is_some() {
         return Err(recovery_mode());
     }
+    let live = state.jobs.live_index();
     if live.index.classes.is_empty() {
         return Err(index_empty());
     }
-    Ok((live, upload, left))
+    Ok(live)
 }
 
 async fn rank(

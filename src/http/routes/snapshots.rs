@@ -2,18 +2,18 @@
 
 use super::classes::insert;
 use crate::http::AppState;
+use crate::http::body::{body_too_large, broke_off, too_late};
 use crate::http::dto::snapshot::{RestoredDto, SnapshotDto};
 use crate::http::dto::{Binary, Page, PageQuery};
 use crate::http::extract::{ApiPath, ApiQuery};
 use crate::http::problem::{Code, Problem};
+use crate::http::request_memory::file_body;
 use crate::http::state::Parts;
-use crate::http::upload::body_too_large;
 use crate::jobs::JobError;
 use crate::model::{Restored, SnapshotId, SnapshotOrigin};
 use crate::store::StoreError;
 use crate::store::snapshot::Staged;
 use axum::Json;
-use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -22,9 +22,10 @@ use std::io::Seek;
 use std::sync::PoisonError;
 use std::time::Duration;
 use tokio::io::AsyncWriteExt;
+use tokio::time::Instant;
 
-/// How long the next piece of a snapshot may take to arrive.
-const PIECE_WITHIN: Duration = Duration::from_secs(30);
+/// Bytes of a snapshot that must arrive in a second, on average, once the time that any body may take is over.
+const SLOWEST: u64 = 1 << 20;
 
 /// Make a snapshot
 ///
@@ -116,8 +117,7 @@ pub async fn get_snapshot_file(
     let file = tokio::fs::File::open(path)
         .await
         .map_err(|e| Problem::from(StoreError::NoSnapshot { id }).logged(e))?;
-    let mut response =
-        Body::from_stream(tokio_util::io::ReaderStream::with_capacity(file, 256 << 10)).into_response();
+    let mut response = file_body(file, &state.memory)?.into_response();
     insert(&mut response, header::CONTENT_LENGTH, &found.bytes.to_string());
     insert(&mut response, header::CONTENT_TYPE, "application/zstd");
     insert(&mut response, header::ETAG, &format!("\"{}\"", found.hash));
@@ -202,18 +202,15 @@ async fn receive(state: &AppState, request: Request, limit: u64) -> Result<std::
     let mut file = tokio::fs::File::from_std(file);
     let mut stream = request.into_body().into_data_stream();
     let mut received = 0_u64;
+    let began = Instant::now();
     loop {
-        let piece = tokio::time::timeout(PIECE_WITHIN, stream.next())
+        // A snapshot may be larger than what arrives within the time limit of other bodies, not slower.
+        let time = state.config.upload_timeout + Duration::from_secs(received / SLOWEST);
+        let piece = tokio::time::timeout_at(began + time, stream.next())
             .await
-            .map_err(|_| {
-                let seconds = PIECE_WITHIN.as_secs();
-                Problem::new(Code::RequestTimeout, format!("nothing arrived for {seconds} s"))
-                    .with("limit_seconds", seconds)
-            })?;
+            .map_err(|_| too_late(time))?;
         let Some(piece) = piece else { break };
-        let piece = piece.map_err(|e| {
-            Problem::new(Code::InvalidRequest, "the body broke off while it arrived").logged(e)
-        })?;
+        let piece = piece.map_err(broke_off)?;
         received += piece.len() as u64;
         if received > limit {
             return Err(too_long());
