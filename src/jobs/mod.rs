@@ -183,6 +183,15 @@ impl Jobs {
         } else {
             live::load(&store)?
         };
+        let taken = live.generation.as_ref().map_or(0, share::index_bytes);
+        if taken > options.memory_bytes / 2 {
+            tracing::warn!(
+                index_mib = taken >> 20,
+                limit_mib = options.memory_bytes >> 20,
+                "the index takes more than half of the memory for indexing, so it cannot be replaced by one as large; \
+                 raise --indexing-memory-mib"
+            );
+        }
         let inner = Arc::new(Inner {
             store,
             options,

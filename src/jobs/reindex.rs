@@ -187,10 +187,14 @@ fn class_bytes(describer: &Describer<'_>, class: &ToLearn) -> u64 {
         estimate::training_signatures(vertices, parameters)
     };
     let signatures = class.shapes.iter().map(of).sum();
-    let descriptions = class.shapes.iter().map(|s| describer.description_bytes(s)).sum();
+    let each = class.shapes.iter().map(|s| describer.description_bytes(s));
+    let (descriptions, largest) = each.fold((0, 0), |(sum, largest): (u64, u64), bytes| {
+        (sum + bytes, largest.max(bytes))
+    });
     // One that is not kept any more is made again.
     let again = class.shapes.iter().map(|s| describer.shape_bytes(s)).max();
-    estimate::learning_bytes(descriptions, signatures, parameters).max(descriptions + again.unwrap_or(0))
+    estimate::learning_bytes(descriptions, largest, signatures, parameters)
+        .max(descriptions + again.unwrap_or(0))
 }
 
 fn too_large(class: &ToLearn, error: &MemoryError) -> ReindexError {

@@ -12,6 +12,8 @@ const F64: u64 = 8;
 const MESH: u64 = 600;
 /// Bytes of a non-zero of a code, in the memory of the thread and in the result.
 const CODE_ENTRY: u64 = 28;
+/// What is in none of the formulas: small buffers of many kinds.
+const SMALL: u64 = 2 << 20;
 /// Signals of a product with all atoms.
 const CODED_TOGETHER: u64 = 256;
 /// Signals the objective is measured on while a dictionary is learnt.
@@ -28,7 +30,7 @@ pub enum Role {
 
 /// Bytes that cleaning and simplifying a mesh takes beside the mesh: welding, edges, quadrics.
 pub fn preparing_bytes(vertices: usize, faces: usize) -> u64 {
-    160 * vertices as u64 + 200 * faces as u64
+    SMALL + 100 * vertices as u64 + 120 * faces as u64
 }
 
 /// Vertices a mesh has at most once it is prepared.
@@ -95,7 +97,8 @@ pub fn describing_bytes(vertices: usize, parameters: &Parameters, role: Role) ->
         true => n.max(parameters.part_eigenpairs),
         false => n,
     };
-    let solve = |pairs: usize| spectral::estimated_bytes(v, pairs) as u64;
+    // An eighth more: a dense solve's workspace is a little larger than the matrices it is estimated by.
+    let solve = |pairs: usize| spectral::estimated_bytes(v, pairs) as u64 * 9 / 8;
     let vectors = |pairs: usize| F64 * (v * pairs.min(v)) as u64;
     let (mut first, mut kept) = (solve(most), vectors(most));
     if has(Hypothesis::Whitened) {
@@ -109,7 +112,7 @@ pub fn describing_bytes(vertices: usize, parameters: &Parameters, role: Role) ->
     let samples = signatures(v, parameters, role) as u64;
     let squares = F64 * samples * most as u64 + vectors(most);
     let views = description_bytes(v, parameters, role);
-    MESH * v as u64 + first.max(kept + doubled.max(2 * vectors(most) + squares + views))
+    SMALL + MESH * v as u64 + first.max(kept + doubled.max(2 * vectors(most) + squares + views))
 }
 
 /// Bytes of a dictionary that is ready to code: atoms at both precisions, and both matrices of their products.
@@ -148,12 +151,13 @@ pub fn ranking_bytes(vertices: usize, atoms: usize, threads: usize, parameters: 
     threads as u64 * each.unwrap_or_default()
 }
 
-/// Bytes at the peak of learning a class from shapes with so many signatures per channel, all of them held.
+/// Bytes at the peak of learning a class from shapes with so many signatures per channel: `descriptions` are the bytes of all
+/// of them, which are held, and `largest` those of one, whose views are copied where it is scored.
 ///
-/// The signatures, the finished dictionaries of the class and those of a fold that is being measured, and of the channel
+/// Beside these, the finished dictionaries of the class and those of a fold that is being measured, and of the channel
 /// that is being learnt: initial, present and rounded atoms, the sums of codes and signals, the matrices of products, a
 /// batch with its codes.
-pub fn learning_bytes(descriptions: u64, signatures: usize, parameters: &Parameters) -> u64 {
+pub fn learning_bytes(descriptions: u64, largest: u64, signatures: usize, parameters: &Parameters) -> u64 {
     let atoms = parameters.atoms.min(signatures);
     let batch = parameters.batch.min(signatures).max(MEASURED as usize);
     let learning = parameters.channels().into_iter().map(|channel| {
@@ -163,5 +167,10 @@ pub fn learning_bytes(descriptions: u64, signatures: usize, parameters: &Paramet
         dictionaries + F64 * m * b + coding_bytes(batch, atoms, dimension)
     });
     let numbers = 64 * signatures as u64;
-    descriptions + 2 * model_bytes(atoms, parameters) + numbers + learning.max().unwrap_or_default()
+    SMALL
+        + descriptions
+        + largest
+        + 2 * model_bytes(atoms, parameters)
+        + numbers
+        + learning.max().unwrap_or_default()
 }

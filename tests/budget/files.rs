@@ -2,7 +2,7 @@
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use std::io::{Cursor, Write};
+use std::io::{Cursor, Read, Write};
 
 /// A zip of one file that unpacks to so many bytes of blanks.
 pub fn zip_bomb(bytes: usize) -> Vec<u8> {
@@ -24,8 +24,6 @@ pub fn gzip_bomb(bytes: usize) -> Vec<u8> {
     builder.append_data(&mut header, "bomb.obj", blanks).unwrap();
     builder.into_inner().unwrap().finish().unwrap()
 }
-
-use std::io::Read;
 
 /// A few corners, and faces of one line without an end.
 pub fn long_line(bytes: usize) -> Vec<u8> {

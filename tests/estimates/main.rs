@@ -54,13 +54,21 @@ static ALLOCATOR: Counted = Counted;
 
 /// What a piece of work allocates at its peak beyond what there was, in bytes, on a pool of its own.
 fn peak_of<T: Send>(work: impl FnOnce() -> T + Send) -> (T, u64) {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-    pool.install(|| {
-        let before = NOW.load(Ordering::Relaxed);
-        PEAK.store(before, Ordering::Relaxed);
-        let done = work();
-        (done, (PEAK.load(Ordering::Relaxed) - before) as u64)
-    })
+    // Scoped, so that its threads, and the memory they keep, are gone when the next one begins.
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(2)
+        .build_scoped(
+            |thread| thread.run(),
+            |pool| {
+                pool.install(|| {
+                    let before = NOW.load(Ordering::Relaxed);
+                    PEAK.store(before, Ordering::Relaxed);
+                    let done = work();
+                    (done, (PEAK.load(Ordering::Relaxed) - before) as u64)
+                })
+            },
+        )
+        .unwrap()
 }
 
 /// A bumpy sphere of rings; without the caps it is open at both ends.
@@ -71,7 +79,9 @@ fn sphere(rings: u32, around: u32, open: bool) -> TriangleSoup {
         let polar = cut + (PI - 2.0 * cut) * f64::from(i) / f64::from(rings - 1);
         for j in 0..around {
             let turn = TAU * f64::from(j) / f64::from(around);
-            let r = 1.0 + 0.25 * (3.0 * turn).cos() * polar.sin() + 0.1 * (5.0 * polar).sin();
+            // Without a symmetry, so that no two signatures are equal.
+            let bumps = 0.25 * (3.0 * turn + polar).cos() * polar.sin() + 0.1 * (turn + 0.3).sin();
+            let r = 1.0 + bumps + 0.1 * (5.0 * polar).sin();
             soup.vertices.push([
                 1.3 * r * polar.sin() * turn.cos(),
                 r * polar.sin() * turn.sin(),
@@ -108,7 +118,7 @@ fn compare(what: &str, peak: u64, estimate: u64, wrong: &mut Vec<String>) {
         estimate as f64 / peak as f64
     );
     println!("{line}");
-    if peak > estimate + (1 << 20) || estimate > 8 * peak + (16 << 20) {
+    if peak > estimate || estimate > 8 * peak + (16 << 20) {
         wrong.push(line);
     }
 }
@@ -206,7 +216,8 @@ fn what_is_reserved_is_enough_and_not_absurd() {
         let shapes: Vec<Description> = (0..4).map(|k| describe(k).unwrap()).collect();
         let all: Vec<&Description> = shapes.iter().collect();
         let signatures: usize = all.iter().map(|d| d.views[0].signatures.len()).sum();
-        let estimate = estimate::learning_bytes(0, signatures, &parameters);
+        let largest = estimate::description_bytes(2000, &parameters, Role::Training);
+        let estimate = estimate::learning_bytes(0, largest, signatures, &parameters);
         let (_, peak) = peak_of(|| {
             let model = learn_model(&all, &parameters, &cancel, &|_, _| ()).unwrap();
             (held_out_scores(&all, &parameters, &cancel).unwrap(), model)

@@ -126,6 +126,56 @@ async fn a_full_house_turns_away_and_says_when_to_come_back() {
     assert_eq!(refused.header("retry-after"), "30");
 }
 
+/// A grid of `side`² vertices with bumps, as OFF.
+fn scan(side: usize) -> Vec<u8> {
+    let mut text = format!("OFF\n{} {} 0\n", side * side, 2 * (side - 1) * (side - 1));
+    for i in 0..side * side {
+        let (x, y) = ((i % side) as f64, (i / side) as f64);
+        text += &format!("{x} {y} {}\n", 8.0 * (0.07 * x).sin() * (0.05 * y).cos());
+    }
+    for i in 0..side - 1 {
+        for j in 0..side - 1 {
+            let a = i * side + j;
+            text += &format!("3 {a} {} {}\n", a + 1, a + side + 1);
+            text += &format!("3 {a} {} {}\n", a + side + 1, a + side);
+        }
+    }
+    text.into_bytes()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_thread_is_free_soon_after_the_deadline_in_whatever_stage() {
+    let indexed = App::indexed().await;
+    let parameters = json!({"eigenpairs": 400, "part_eigenpairs": 400, "working_size": 20_000, "atoms": 12,
+                            "iterations": 2, "samples_per_shape": 100});
+    let job = indexed.reindex(json!({"parameters": parameters})).await;
+    assert_eq!(job["state"], "succeeded", "{job}");
+    let scan = scan(400);
+    let mut freed = Vec::new();
+    for milliseconds in [5, 30, 80, 150, 300, 600, 1000] {
+        let limit = Duration::from_millis(milliseconds);
+        let state = indexed.state.clone();
+        let body = scan.clone();
+        // As a client that leaves does it: the request is dropped.
+        let left = tokio::time::timeout(limit, indexed.post("/v1/query", "model/off", body)).await;
+        let began = std::time::Instant::now();
+        // What was reserved is given back, too.
+        while state.compute.running() + state.unpacking.running() > 0 || state.memory.used() > 0 {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+        println!(
+            "left after {limit:?}: free after {:?}, {}",
+            began.elapsed(),
+            left.is_err()
+        );
+        freed.push(began.elapsed());
+    }
+    freed.sort_unstable();
+    let median = freed[freed.len() / 2];
+    assert!(median < Duration::from_millis(100), "{freed:?}");
+    assert!(freed[freed.len() - 1] < Duration::from_secs(1), "{freed:?}");
+}
+
 #[tokio::test]
 async fn a_mesh_that_does_not_fit_the_memory_is_refused_before_it_is_built() {
     let app = App::with(|config| config.memory_bytes = 200 << 10);

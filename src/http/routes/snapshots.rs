@@ -10,6 +10,7 @@ use crate::http::problem::{Code, Problem};
 use crate::http::request_memory::file_body;
 use crate::http::state::Parts;
 use crate::jobs::JobError;
+use crate::memory::Reservation;
 use crate::model::{Restored, SnapshotId, SnapshotOrigin};
 use crate::store::StoreError;
 use crate::store::snapshot::Staged;
@@ -142,7 +143,10 @@ pub async fn restore_snapshot(
     let id = parse(&snapshot)?;
     refuse_busy(&state)?;
     let restored = state
-        .blocking(move |s| take_over(s, s.store.stage_own_snapshot(id, s.config.snapshot_max_bytes)?))
+        .blocking(move |s| {
+            let _memory = reserve(s)?;
+            take_over(s, s.store.stage_own_snapshot(id, s.config.snapshot_max_bytes)?)
+        })
         .await?;
     Ok(Json(restored.into()))
 }
@@ -166,9 +170,22 @@ pub async fn restore_upload(
     let limit = state.config.snapshot_max_bytes;
     let archive = receive(&state, request, limit).await?;
     let restored = state
-        .blocking(move |s| take_over(s, s.store.stage_snapshot(archive, limit)?))
+        .blocking(move |s| {
+            let _memory = reserve(s)?;
+            take_over(s, s.store.stage_snapshot(archive, limit)?)
+        })
         .await?;
     Ok(Json(restored.into()))
+}
+
+/// What unpacking a snapshot takes at most, in bytes: zstd looks back over up to 128 MiB, and records are read whole.
+const UNPACKING: u64 = 160 << 20;
+
+/// Memory for a restore, or all there is of it where that is less.
+fn reserve(parts: &Parts) -> Result<Reservation, Problem> {
+    let memory = parts.memory.reservation();
+    memory.grow(UNPACKING.min(parts.memory.limit()))?;
+    Ok(memory)
 }
 
 /// Switches with nobody else at the catalogue and no job in the way.
