@@ -1,7 +1,7 @@
 //! Learning the index: describe the shapes, learn the classes, switch.
 
 use super::baselines::learn_baselines;
-use super::describe::{Describer, Failure};
+use super::describe::{Described, Describer, Failure};
 use super::failure::{MEMORY_EXCEEDED, ReindexError, code, no_memory};
 use super::live::{LiveIndex, calibration, load_baselines};
 use super::plan::{Plan, ToLearn, plan, shape_key, skipped};
@@ -105,50 +105,10 @@ fn learn_classes(
     let described = describer.describe_all(&shapes, request.progress)?;
     report.described = described.computed;
     report.described_before = described.cached;
-    if !shapes.is_empty()
-        && shapes
-            .iter()
-            .all(|shape| described.failures.contains_key(&shape.identity()))
-    {
-        let first = described.failures.values().next();
-        let memory = |failure: &Failure| failure.code == MEMORY_EXCEEDED;
-        let code = match described.failures.values().all(memory) {
-            true => MEMORY_EXCEEDED,
-            false => "all_shapes_failed",
-        };
-        return Err(ReindexError::failed(
-            code,
-            format!(
-                "none of {} shapes could be described; the first: {}",
-                shapes.len(),
-                first.map_or("", |failure| &failure.detail)
-            ),
-        ));
-    }
+    check_any_described(&shapes, &described)?;
 
     request.progress.begin("learn classes", learn.len());
-    let estimates: Vec<u64> = learn.iter().map(|class| class_bytes(describer, class)).collect();
-    let learnt: Vec<Learnt> = describer
-        .share
-        .run(&estimates, |i, _| {
-            let class = &learn[i];
-            let mut failed = Vec::new();
-            let mut good = Vec::new();
-            for shape in &class.shapes {
-                match described.failures.get(&shape.identity()) {
-                    Some(failure) => failed.push(failure.of(shape)),
-                    None => good.push(shape),
-                }
-            }
-            let learnt = learn_class(request, describer, class, &good, failed);
-            request.progress.advance();
-            learnt
-        })
-        .into_iter()
-        .enumerate()
-        .map(|(i, learnt)| learnt.map_err(|error| too_large(&learn[i], &error))?)
-        .collect::<Result<_, ReindexError>>()?;
-
+    let learnt = learn_each(request, describer, learn, &described)?;
     let tried = learnt.len();
     for learnt in learnt {
         let failed = match learnt {
@@ -177,6 +137,61 @@ fn learn_classes(
     }
     classes.sort_by_key(|class| class.class);
     Ok(())
+}
+
+/// Fails where shapes were to be described and none could be.
+fn check_any_described(shapes: &[&Shape], described: &Described) -> Result<(), ReindexError> {
+    if !shapes.is_empty()
+        && shapes
+            .iter()
+            .all(|shape| described.failures.contains_key(&shape.identity()))
+    {
+        let first = described.failures.values().next();
+        let memory = |failure: &Failure| failure.code == MEMORY_EXCEEDED;
+        let code = match described.failures.values().all(memory) {
+            true => MEMORY_EXCEEDED,
+            false => "all_shapes_failed",
+        };
+        return Err(ReindexError::failed(
+            code,
+            format!(
+                "none of {} shapes could be described; the first: {}",
+                shapes.len(),
+                first.map_or("", |failure| &failure.detail)
+            ),
+        ));
+    }
+    Ok(())
+}
+
+/// Learns classes from what was described of them, as many side by side as fit the memory.
+fn learn_each(
+    request: &Reindex<'_>,
+    describer: &Describer<'_>,
+    learn: &[ToLearn],
+    described: &Described,
+) -> Result<Vec<Learnt>, ReindexError> {
+    let estimates: Vec<u64> = learn.iter().map(|class| class_bytes(describer, class)).collect();
+    describer
+        .share
+        .run(&estimates, |i, _| {
+            let class = &learn[i];
+            let mut failed = Vec::new();
+            let mut good = Vec::new();
+            for shape in &class.shapes {
+                match described.failures.get(&shape.identity()) {
+                    Some(failure) => failed.push(failure.of(shape)),
+                    None => good.push(shape),
+                }
+            }
+            let learnt = learn_class(request, describer, class, &good, failed);
+            request.progress.advance();
+            learnt
+        })
+        .into_iter()
+        .enumerate()
+        .map(|(i, learnt)| learnt.map_err(|error| too_large(&learn[i], &error))?)
+        .collect::<Result<_, ReindexError>>()
 }
 
 /// Memory that learning a class takes at most, in bytes.

@@ -190,3 +190,43 @@ async fn a_mesh_that_does_not_fit_the_memory_is_refused_before_it_is_built() {
     assert_eq!(app.get("/v1/classes").await.value()["items"], json!([]));
     assert_eq!(app.state.memory.used(), 0);
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_reindex_that_does_not_fit_its_memory_fails_and_names_the_numbers() {
+    let app = App::with(|config| config.indexing_memory_bytes = 48 << 20);
+    for class in crate::meshes::CLASSES {
+        for pose in 0..2 {
+            let path = format!("/v1/classes/{class}/shapes?create=true&name={pose}.off");
+            let answer = app
+                .post(&path, "model/off", crate::meshes::off(class, pose))
+                .await;
+            assert_eq!(answer.status, 201, "{}", answer.text());
+        }
+    }
+    // What fits runs, if need be one shape at a time.
+    let job = app
+        .reindex(json!({"parameters": crate::harness::small()}))
+        .await;
+    assert_eq!(job["state"], "succeeded", "{job}");
+    for (parameter, value) in [("refine_below", 100_000), ("atoms", 5000)] {
+        let mut parameters = crate::harness::small();
+        parameters[parameter] = json!(value);
+        parameters["samples_per_shape"] = json!(0);
+        parameters["energies"] = json!(2000);
+        let job = app
+            .reindex(json!({"scope": "all", "parameters": parameters}))
+            .await;
+        assert_eq!(job["state"], "failed", "{parameter}: {job}");
+        assert_eq!(job["failure"]["code"], "memory_exceeded", "{parameter}: {job}");
+        let detail = job["failure"]["detail"].as_str().unwrap();
+        assert!(
+            detail.contains("MiB") && detail.contains("--indexing-memory-mib"),
+            "{detail}"
+        );
+    }
+    // The index that is served stays.
+    let answer = app
+        .post("/v1/query", "model/off", crate::meshes::off("bean", 5))
+        .await;
+    assert_eq!(answer.status, 200, "{}", answer.text());
+}
