@@ -193,7 +193,7 @@ fn held_open(target: &Target, _: usize) -> String {
 
 fn sends(stream: &mut TcpStream, piece: &[u8]) -> bool {
     match stream.write(piece) {
-        Ok(_) => true,
+        Ok(sent) => sent > 0,
         Err(error) => error.kind() == std::io::ErrorKind::WouldBlock,
     }
 }

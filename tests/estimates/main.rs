@@ -54,21 +54,27 @@ static ALLOCATOR: Counted = Counted;
 
 /// What a piece of work allocates at its peak beyond what there was, in bytes, on a pool of its own.
 fn peak_of<T: Send>(work: impl FnOnce() -> T + Send) -> (T, u64) {
-    // Scoped, so that its threads, and the memory they keep, are gone when the next one begins.
-    rayon::ThreadPoolBuilder::new()
+    let mut threads = Vec::new();
+    let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(2)
-        .build_scoped(
-            |thread| thread.run(),
-            |pool| {
-                pool.install(|| {
-                    let before = NOW.load(Ordering::Relaxed);
-                    PEAK.store(before, Ordering::Relaxed);
-                    let done = work();
-                    (done, (PEAK.load(Ordering::Relaxed) - before) as u64)
-                })
-            },
-        )
-        .unwrap()
+        .spawn_handler(|thread| {
+            threads.push(std::thread::spawn(|| thread.run()));
+            Ok(())
+        })
+        .build()
+        .unwrap();
+    let measured = pool.install(|| {
+        let before = NOW.load(Ordering::Relaxed);
+        PEAK.store(before, Ordering::Relaxed);
+        let done = work();
+        (done, (PEAK.load(Ordering::Relaxed) - before) as u64)
+    });
+    // What a thread keeps is freed when it ends, and must not be counted as there when the next piece of work begins.
+    drop(pool);
+    for thread in threads {
+        thread.join().unwrap();
+    }
+    measured
 }
 
 /// A bumpy sphere of rings; without the caps it is open at both ends.

@@ -204,9 +204,7 @@ async fn a_reindex_that_does_not_fit_its_memory_fails_and_names_the_numbers() {
         }
     }
     // What fits runs, if need be one shape at a time.
-    let job = app
-        .reindex(json!({"parameters": crate::harness::small()}))
-        .await;
+    let job = app.reindex(json!({"parameters": crate::harness::small()})).await;
     assert_eq!(job["state"], "succeeded", "{job}");
     for (parameter, value) in [("refine_below", 100_000), ("atoms", 5000)] {
         let mut parameters = crate::harness::small();
