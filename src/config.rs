@@ -185,8 +185,10 @@ settings! {
     max_faces: usize = 4_000_000, "SHAPELEX_MAX_FACES", "COUNT";
     /// Poses sampled from one animated file, at most
     max_poses: usize = 64, "SHAPELEX_MAX_POSES", "COUNT";
-    /// Memory that requests may take for computing, all together, in MiB; a mesh that would take more is refused
+    /// Memory for requests and for learning, all together, in MiB: bodies, what is unpacked of them, computing, answers, the index
     memory_mib: u64 = 2048, "SHAPELEX_MEMORY_MIB", "MIB";
+    /// What of it learning and the index may take, in MiB; 0 takes a quarter
+    indexing_memory_mib: u64 = 0, "SHAPELEX_INDEXING_MEMORY_MIB", "MIB";
     /// Threads that answer queries; 0 takes one per core
     query_threads: usize = 0, "SHAPELEX_QUERY_THREADS", "COUNT";
     /// Queries that may wait for a thread before more are refused
@@ -332,6 +334,13 @@ impl Config {
                 found: name.clone(),
             });
         }
+        if self.indexing_mib() >= self.memory_mib {
+            return Err(ConfigError::OutOfRange {
+                name: "indexing_memory_mib",
+                expected: "less than memory_mib",
+                found: self.indexing_memory_mib.to_string(),
+            });
+        }
         if !(1..=1024).contains(&self.max_header_kib) {
             return Err(ConfigError::OutOfRange {
                 name: "max_header_kib",
@@ -346,6 +355,13 @@ impl Config {
                 found: value.to_string(),
             }),
             None => Ok(()),
+        }
+    }
+
+    fn indexing_mib(&self) -> u64 {
+        match self.indexing_memory_mib {
+            0 => self.memory_mib / 4,
+            given => given,
         }
     }
 
@@ -385,7 +401,8 @@ impl Config {
                 max_poses: self.max_poses,
                 ..Limits::default()
             },
-            memory_bytes: self.memory_mib << 20,
+            memory_bytes: (self.memory_mib - self.indexing_mib()) << 20,
+            indexing_memory_bytes: self.indexing_mib() << 20,
             query_threads: or_default(self.query_threads, default.query_threads),
             query_queue: self.query_queue,
             query_wait: Duration::from_secs(self.query_wait_seconds),

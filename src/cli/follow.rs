@@ -79,7 +79,10 @@ pub fn succeeded(job: Value) -> Result<Value, CliError> {
 }
 
 fn has_ended(job: &Value) -> bool {
-    matches!(job["state"].as_str(), Some("succeeded" | "failed" | "cancelled" | "canceled"))
+    matches!(
+        job["state"].as_str(),
+        Some("succeeded" | "failed" | "cancelled" | "canceled")
+    )
 }
 
 /// The progress of a job's steps, one after the other.

@@ -101,10 +101,10 @@ fn create(args: &CreateArgs, json: bool) -> Result<(), CliError> {
         }
     }
     KeyName::new(&args.name).map_err(|error| CliError::Usage(format!("{}: {error}", args.name)))?;
-    let made = args
-        .target
-        .operator_client_or_new()?
-        .call("POST", "/v1/keys", Payload::Json(Value::Object(body)))?;
+    let made =
+        args.target
+            .operator_client_or_new()?
+            .call("POST", "/v1/keys", Payload::Json(Value::Object(body)))?;
     if json {
         return output::json(&made);
     }

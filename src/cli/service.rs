@@ -6,6 +6,9 @@ use std::future::Future;
 use std::net::SocketAddr;
 use tokio::net::TcpListener;
 
+/// Threads that wait for the disk, at most. Each has a stack and memory of its own; more would only queue at the disk.
+const BLOCKING_THREADS: usize = 64;
+
 /// Serves until `shutdown` resolves. `listening` is told the address once connections are accepted.
 ///
 /// # Errors
@@ -16,7 +19,10 @@ pub fn run_until(
     listening: impl FnOnce(SocketAddr) -> Result<(), CliError>,
 ) -> Result<(), CliError> {
     process::prepare(&mut config);
-    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .max_blocking_threads(BLOCKING_THREADS)
+        .build()?;
     let outcome = runtime.block_on(async {
         let address = config.listen;
         // The address first: opening a large data directory takes a while, a taken port should say so at once.

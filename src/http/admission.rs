@@ -17,6 +17,8 @@ use tracing::{Instrument, info_span};
 /// How the pool is sized.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ComputeOptions {
+    /// What its threads are called.
+    pub name: &'static str,
     /// Threads, and pieces of work at the same time.
     pub threads: usize,
     /// Pieces of work that may wait.
@@ -59,7 +61,7 @@ impl Compute {
         let threads = options.threads.max(1);
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
-            .thread_name(|i| format!("query-{i}"))
+            .thread_name(move |i| format!("{}-{i}", options.name))
             .build()?;
         Ok(Self {
             pool,
@@ -194,6 +196,7 @@ mod tests {
 
     fn pool(queue: usize, wait: u64) -> Compute {
         Compute::new(ComputeOptions {
+            name: "test",
             threads: 1,
             queue,
             wait: Duration::from_millis(wait),

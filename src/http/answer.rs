@@ -11,14 +11,14 @@ use super::state::Parts;
 use super::time_limit::{TimeView, rank_until};
 use super::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
-use crate::mesh::{ReadContext, TriangleSoup};
+use crate::mesh::TriangleSoup;
 use crate::model::{ClassId, Generation, Origin};
-use crate::parameters::{Channel, Parameters};
+use crate::parameters::Channel;
+use crate::pipeline::estimate::{self, Role};
 use crate::pipeline::{
     Description, Stage, StageSpan, describe_plain, describe_query, judged_by, rank, rank_top,
 };
 use crate::ranking::{Index, JUDGED, NotJudged, SIGNIFICANCE};
-use crate::spectral;
 use crate::store::StoreError;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -49,20 +49,16 @@ pub fn answer(
     let watch = Stopwatch::default();
     let observer = |stage| watch.begin(stage);
     observer(Stage::Read);
-    let reserved = state.memory.reservation();
-    reserved.grow(mesh.reading_bytes())?;
-    let context = ReadContext {
-        cancel: work.cancel.clone(),
-        ..ReadContext::new(state.config.limits)
-    };
-    let (format, soup) = mesh.read(&context)?;
-    // Held beside each other, since preparing, which the reading is reserved for, is a part of describing.
-    reserved.grow(spectrum_bytes(&soup, parameters))?;
     let stop = limit.map_or(&work.cancel, |limit| &limit.over);
     let timely = |problem: Problem| match limit {
         Some(limit) if problem.code == Code::Cancelled => limit.nothing_scored(),
         _ => problem,
     };
+    let context = mesh.context(state.config.limits, stop);
+    let (format, soup) = mesh.read(&context).map_err(timely)?;
+    context
+        .memory
+        .grow(computing_bytes(&soup, &index, state.config.query_threads))?;
     let named = options.rank_by.unwrap_or(parameters.rank_by.into());
     let name_of = |label: &str| names.get(label).cloned().unwrap_or_else(|| label.to_owned());
     let (description, ranking, left, verdict) = match named.method() {
@@ -106,7 +102,8 @@ pub fn answer(
             (description, ranked, left, verdict)
         }
     };
-    drop(reserved);
+    let warnings_of_reading = context.warnings.list();
+    drop(context);
     let stages = watch.end();
     for (stage, took) in &stages {
         metrics::time_stage(*stage, *took);
@@ -168,7 +165,7 @@ pub fn answer(
         signatures: ranking.signatures,
         samples: (options.details == Some(DetailsName::Samples)).then(|| samples(&description)),
         format: format.extension().to_owned(),
-        warnings: [context.warnings.list(), description.report.warnings.clone()].concat(),
+        warnings: [warnings_of_reading, description.report.warnings.clone()].concat(),
         mesh: description.report.into(),
         eigenvalues: description.eigenvalues,
         generation: generation.number,
@@ -215,14 +212,25 @@ fn samples(description: &Description) -> Vec<SampledView> {
     views.collect()
 }
 
-/// Memory the spectrum takes, in bytes, by the size the mesh is simplified to.
-fn spectrum_bytes(soup: &TriangleSoup, parameters: &Parameters) -> u64 {
-    let vertices = match parameters.working_size {
-        0 => soup.vertices.len(),
-        // Closing holes adds a vertex for each.
-        size => soup.vertices.len().min(size.saturating_mul(2)),
-    };
-    spectral::estimated_bytes(vertices, parameters.eigenpairs) as u64
+/// Memory that describing and ranking a mesh takes beside the mesh itself, in bytes.
+fn computing_bytes(soup: &TriangleSoup, index: &Index, threads: usize) -> u64 {
+    let (vertices, parameters) = (soup.vertices.len(), &index.parameters);
+    let largest = (index.classes.iter())
+        .flat_map(|class| class.dictionaries.values())
+        .map(|dictionary| dictionary.len())
+        .max();
+    let preparing = estimate::preparing_bytes(vertices, soup.faces.len());
+    let describing = estimate::describing_bytes(vertices, parameters, Role::Query);
+    let ranking = estimate::ranking_bytes(vertices, largest.unwrap_or(0), threads, parameters);
+    // Views are held while they are ranked, and the spectra are gone then.
+    preparing.max(describing).max(
+        ranking
+            + estimate::description_bytes(
+                estimate::prepared_vertices(vertices, parameters),
+                parameters,
+                Role::Query,
+            ),
+    )
 }
 
 /// The index without the classes that were deleted since it was learnt, and the names the others have now.

@@ -1,9 +1,13 @@
 //! Zip, tar and tar.gz uploads → their files, in memory and within limits.
 //!
 //! Nothing is ever written to disk under a name from an archive. Limits hold for what comes out while it comes out, so
-//! a declared size is never believed.
+//! a declared size is never believed, and memory is reserved for it as it does.
 
+use super::archive_path::{is_clutter, safe_path};
+use super::arriving::Arriving;
 use super::problem::{Code, Problem};
+use crate::cancel::Cancel;
+use crate::memory::{MemoryBudget, MemoryError, Reservation};
 use std::cell::Cell;
 use std::io::{Cursor, Read};
 
@@ -49,34 +53,61 @@ pub fn detect(bytes: &[u8]) -> Option<ArchiveKind> {
     }
 }
 
+/// What an archive is unpacked within.
+#[derive(Clone, Copy, Debug)]
+pub struct Unpacking<'a> {
+    /// Set when the files are no longer wanted.
+    pub cancel: &'a Cancel,
+    /// The memory of the request the archive came with; its files count as a part of the body.
+    pub memory: &'a Reservation,
+}
+
 /// The regular files of an archive, in its order. Folders, links, hidden files and the resource forks macOS adds are
 /// left out.
 ///
 /// # Errors
 /// `invalid_archive`, `unsafe_archive_path`, `nested_archive`, `too_many_files` and `archive_too_large`.
 pub fn unpack(kind: ArchiveKind, bytes: &[u8], limits: &ArchiveLimits) -> Result<Vec<Member>, Problem> {
+    let unpacking = Unpacking {
+        cancel: &Cancel::new(),
+        memory: &MemoryBudget::unlimited().reservation(),
+    };
+    unpack_within(kind, bytes, limits, &unpacking)
+}
+
+/// As [`unpack`], within the memory of a request and until it is stopped.
+///
+/// # Errors
+/// Those of [`unpack`]; `archive_too_large` where the files never fit the memory, `overloaded` where they do not at the
+/// moment; `cancelled`.
+pub fn unpack_within(
+    kind: ArchiveKind,
+    bytes: &[u8],
+    limits: &ArchiveLimits,
+    unpacking: &Unpacking<'_>,
+) -> Result<Vec<Member>, Problem> {
+    let collected = Collector::new(limits, unpacking);
     match kind {
-        ArchiveKind::Zip => unpack_zip(bytes, limits),
-        ArchiveKind::Tar => unpack_tar(Cursor::new(bytes), limits),
+        ArchiveKind::Zip => unpack_zip(bytes, collected),
+        ArchiveKind::Tar => unpack_tar(Cursor::new(bytes), collected),
         ArchiveKind::TarGz => {
             // Headers, padding and folders come out of the gzip too, so its own ceiling lies above that of the files.
             let ceiling = limits
                 .max_bytes
                 .saturating_add(limits.max_members.saturating_mul(2048));
             let inflated = flate2::read::MultiGzDecoder::new(bytes).take(ceiling as u64 + 1);
-            unpack_tar(inflated, limits)
+            unpack_tar(inflated, collected)
         }
     }
 }
 
-fn unpack_zip(bytes: &[u8], limits: &ArchiveLimits) -> Result<Vec<Member>, Problem> {
+fn unpack_zip(bytes: &[u8], mut collected: Collector<'_>) -> Result<Vec<Member>, Problem> {
     let broken = |error: zip::result::ZipError| broken("zip", error);
     // The iterable reader parses one entry at a time: a directory of a million entries costs nothing before its
     // count is seen.
     let mut archive =
         zip::unstable::read::ZipIterable::try_new(Cursor::new(bytes), zip::read::Config::default())
             .map_err(broken)?;
-    let mut collected = Collector::new(limits);
     collected.check_count(archive.len())?;
     let mut files = archive
         .files_with_cloned_reader(zip::read::ZipReadOptions::new())
@@ -101,10 +132,13 @@ const MAX_TAR_HEADERS: u64 = 1 << 20;
 struct Rationed<'a, R> {
     reader: R,
     left: &'a Cell<u64>,
+    cancel: &'a Cancel,
 }
 
 impl<R: Read> Read for Rationed<'_, R> {
     fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
+        // Most reads are of a few KiB; the contents of a member that is passed over are read here and nowhere else.
+        self.cancel.check().map_err(std::io::Error::other)?;
         let most = usize::try_from(self.left.get())
             .unwrap_or(usize::MAX)
             .min(into.len());
@@ -119,12 +153,20 @@ impl<R: Read> Read for Rationed<'_, R> {
     }
 }
 
-fn unpack_tar(reader: impl Read, limits: &ArchiveLimits) -> Result<Vec<Member>, Problem> {
+fn unpack_tar(reader: impl Read, mut collected: Collector<'_>) -> Result<Vec<Member>, Problem> {
     let left = Cell::new(MAX_TAR_HEADERS);
-    let mut archive = tar::Archive::new(Rationed { reader, left: &left });
-    let mut collected = Collector::new(limits);
-    for entry in archive.entries().map_err(|e| broken("tar", e))? {
-        let mut entry = entry.map_err(|e| broken("tar", e))?;
+    let cancel = collected.unpacking.cancel;
+    let broken = |error: std::io::Error| match cancel.check() {
+        Ok(()) => broken("tar", error),
+        Err(stopped) => Problem::new(Code::Cancelled, stopped.to_string()),
+    };
+    let mut archive = tar::Archive::new(Rationed {
+        reader,
+        left: &left,
+        cancel,
+    });
+    for entry in archive.entries().map_err(broken)? {
+        let mut entry = entry.map_err(broken)?;
         // The contents have limits of their own.
         left.set(u64::MAX);
         if entry.header().entry_type().is_file() {
@@ -135,12 +177,12 @@ fn unpack_tar(reader: impl Read, limits: &ArchiveLimits) -> Result<Vec<Member>, 
             collected.count()?;
         }
         // What was not taken is passed over here, since the next entry would do so at the expense of its own headers.
-        std::io::copy(&mut entry, &mut std::io::sink()).map_err(|e| broken("tar", e))?;
+        std::io::copy(&mut entry, &mut std::io::sink()).map_err(broken)?;
         left.set(MAX_TAR_HEADERS);
     }
     left.set(u64::MAX);
     // The entries end before the stream does; what follows may be where a compressed one turns out to be cut short.
-    std::io::copy(&mut archive.into_inner(), &mut std::io::sink()).map_err(|e| broken("tar", e))?;
+    std::io::copy(&mut archive.into_inner(), &mut std::io::sink()).map_err(broken)?;
     Ok(collected.members)
 }
 
@@ -151,17 +193,36 @@ fn broken(kind: &str, error: impl std::fmt::Display) -> Problem {
     )
 }
 
+/// Bytes that are unpacked between two looks at the stop flag.
+const PIECE: usize = 64 << 10;
+
+/// The problem of files for which there is no memory: for good, or at the moment.
+fn no_room(error: MemoryError) -> Problem {
+    match error {
+        MemoryError::NeverFits { limit, .. } => Problem::new(
+            Code::ArchiveTooLarge,
+            format!("the archive and its files do not fit the memory for bodies, {limit} bytes; send fewer at a time"),
+        )
+        .with("limit_bytes", limit),
+        MemoryError::NotNow { .. } => error.into(),
+    }
+}
+
 struct Collector<'a> {
     limits: &'a ArchiveLimits,
+    unpacking: &'a Unpacking<'a>,
+    piece: Vec<u8>,
     members: Vec<Member>,
     seen: usize,
     bytes: usize,
 }
 
 impl<'a> Collector<'a> {
-    fn new(limits: &'a ArchiveLimits) -> Self {
+    fn new(limits: &'a ArchiveLimits, unpacking: &'a Unpacking<'a>) -> Self {
         Self {
             limits,
+            unpacking,
+            piece: vec![0; PIECE],
             members: Vec::new(),
             seen: 0,
             bytes: 0,
@@ -206,17 +267,26 @@ impl<'a> Collector<'a> {
         if declared > left as u64 {
             return Err(self.too_large());
         }
-        // Room for what is promised, so that growing does not hold a file twice; pages nobody writes to cost nothing.
-        let mut bytes = Vec::with_capacity(usize::try_from(declared).unwrap_or(0));
-        reader
-            .by_ref()
-            .take(left as u64 + 1)
-            .read_to_end(&mut bytes)
-            .map_err(|e| broken("archive", format!("{path}: {e}")))?;
-        if bytes.len() > left {
-            return Err(self.too_large());
+        let path_bytes = (path.len() + size_of::<Member>()) as u64;
+        self.unpacking.memory.grow_body(path_bytes).map_err(no_room)?;
+        let mut contents = Arriving::new(left, self.unpacking.memory);
+        loop {
+            self.unpacking
+                .cancel
+                .check()
+                .map_err(|stopped| Problem::new(Code::Cancelled, stopped.to_string()))?;
+            let read = reader
+                .read(&mut self.piece)
+                .map_err(|e| broken("archive", format!("{path}: {e}")))?;
+            if read == 0 {
+                break;
+            }
+            if contents.len() + read > left {
+                return Err(self.too_large());
+            }
+            contents.push(&self.piece[..read]).map_err(no_room)?;
         }
-        bytes.shrink_to_fit();
+        let bytes = contents.finish();
         if detect(&bytes).is_some() {
             return Err(Problem::new(
                 Code::NestedArchive,
@@ -230,162 +300,5 @@ impl<'a> Collector<'a> {
     }
 }
 
-/// Longest path of a member, in bytes; no file system takes a longer one.
-const MAX_PATH: usize = 4096;
-
-/// The path with forward slashes and without `.` parts. Absolute paths, drive letters, `..`, control characters and
-/// endless names are refused: no honest archive of meshes has them.
-fn safe_path(path: &str) -> Result<String, Problem> {
-    let unsafe_path = || {
-        Problem::new(
-            Code::UnsafeArchivePath,
-            format!(
-                "'{}' is not a path inside the archive",
-                path.chars().take(200).collect::<String>().escape_debug()
-            ),
-        )
-    };
-    if path.len() > MAX_PATH {
-        return Err(unsafe_path());
-    }
-    let path = path.replace('\\', "/");
-    let drive = path.as_bytes().get(1) == Some(&b':') && path.as_bytes()[0].is_ascii_alphabetic();
-    if path.starts_with('/') || drive || path.chars().any(char::is_control) {
-        return Err(unsafe_path());
-    }
-    let mut parts = Vec::new();
-    for part in path.split('/') {
-        match part {
-            "" | "." => {}
-            ".." => return Err(unsafe_path()),
-            other => parts.push(other),
-        }
-    }
-    if parts.is_empty() {
-        return Err(unsafe_path());
-    }
-    Ok(parts.join("/"))
-}
-
-fn is_clutter(path: &str) -> bool {
-    path.split('/')
-        .any(|part| part.starts_with('.') || part == "__MACOSX" || part == "Thumbs.db")
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::io::Write;
-
-    const LIMITS: ArchiveLimits = ArchiveLimits {
-        max_members: 3,
-        max_bytes: 1000,
-    };
-
-    fn zip_of(files: &[(&str, &[u8])]) -> Vec<u8> {
-        let mut writer = zip::ZipWriter::new(Cursor::new(Vec::new()));
-        for (name, bytes) in files {
-            writer
-                .start_file(*name, zip::write::SimpleFileOptions::default())
-                .unwrap();
-            writer.write_all(bytes).unwrap();
-        }
-        writer.finish().unwrap().into_inner()
-    }
-
-    fn tar_of(files: &[(&str, &[u8])]) -> Vec<u8> {
-        let mut builder = tar::Builder::new(Vec::new());
-        for (name, bytes) in files {
-            let mut header = tar::Header::new_ustar();
-            header.set_size(bytes.len() as u64);
-            header.set_mode(0o644);
-            // Written by hand: the builder itself refuses the unsafe names these tests need.
-            header.as_old_mut().name[..name.len()].copy_from_slice(name.as_bytes());
-            header.set_cksum();
-            builder.append(&header, *bytes).unwrap();
-        }
-        builder.into_inner().unwrap()
-    }
-
-    fn gzip(bytes: &[u8]) -> Vec<u8> {
-        let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
-        encoder.write_all(bytes).unwrap();
-        encoder.finish().unwrap()
-    }
-
-    fn open(bytes: &[u8]) -> Result<Vec<Member>, Code> {
-        let kind = detect(bytes).expect("an archive");
-        unpack(kind, bytes, &LIMITS).map_err(|p| p.code)
-    }
-
-    #[test]
-    fn the_three_kinds_give_the_same_files() {
-        let files: &[(&str, &[u8])] = &[
-            ("a/one.off", b"OFF"),
-            ("__MACOSX/._x", b"x"),
-            ("./two.obj", b"v 0 0 0"),
-        ];
-        let expected = vec![
-            Member {
-                path: "a/one.off".into(),
-                bytes: b"OFF".to_vec(),
-            },
-            Member {
-                path: "two.obj".into(),
-                bytes: b"v 0 0 0".to_vec(),
-            },
-        ];
-        assert_eq!(open(&zip_of(files)), Ok(expected.clone()));
-        assert_eq!(open(&tar_of(files)), Ok(expected.clone()));
-        assert_eq!(open(&gzip(&tar_of(files))), Ok(expected));
-    }
-
-    #[test]
-    fn hostile_archives_are_refused_by_name() {
-        for path in [
-            "../x.off",
-            "/etc/x.off",
-            "a/../../x.off",
-            "C:/x.off",
-            "a\\..\\..\\x.off",
-        ] {
-            assert_eq!(
-                open(&tar_of(&[(path, b"OFF")])),
-                Err(Code::UnsafeArchivePath),
-                "{path}"
-            );
-            assert_eq!(
-                open(&zip_of(&[(path, b"OFF")])),
-                Err(Code::UnsafeArchivePath),
-                "{path}"
-            );
-        }
-        let inner = zip_of(&[("x.off", b"OFF")]);
-        assert_eq!(open(&zip_of(&[("inner.zip", &inner)])), Err(Code::NestedArchive));
-        let many: &[(&str, &[u8])] = &[("1", b""), ("2", b""), ("3", b""), ("4", b"")];
-        assert_eq!(open(&zip_of(many)), Err(Code::TooManyFiles));
-        assert_eq!(open(&tar_of(many)), Err(Code::TooManyFiles));
-        let bomb = vec![0u8; 100_000];
-        assert_eq!(open(&zip_of(&[("bomb.off", &bomb)])), Err(Code::ArchiveTooLarge));
-        assert_eq!(
-            open(&gzip(&tar_of(&[("bomb.off", &bomb)]))),
-            Err(Code::ArchiveTooLarge)
-        );
-    }
-
-    #[test]
-    fn damaged_archives_are_refused_at_every_length() {
-        let whole = zip_of(&[("a.off", b"OFF 1 2 3"), ("b.off", b"OFF 4 5 6")]);
-        for length in 4..whole.len() {
-            assert_eq!(
-                open(&whole[..length]),
-                Err(Code::InvalidArchive),
-                "zip cut at {length}"
-            );
-        }
-        let whole = gzip(&tar_of(&[("a.off", b"OFF 1 2 3")]));
-        for length in 2..whole.len() {
-            assert!(open(&whole[..length]).is_err(), "tar.gz cut at {length}");
-        }
-    }
-}
+mod tests;

@@ -2,7 +2,6 @@
 
 use super::archive::ArchiveLimits;
 use super::connections::ConnectionLimits;
-use super::upload::UploadLimits;
 use crate::jobs::JobOptions;
 use crate::mesh::Limits;
 use crate::model::KeyLimits;
@@ -11,6 +10,15 @@ use crate::store::StoreOptions;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::time::Duration;
+
+/// What an upload may hold at most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UploadLimits {
+    /// Bytes of the whole body.
+    pub max_body_bytes: usize,
+    /// Members of an archive and their bytes; a multipart body has no more parts than that either.
+    pub archive: ArchiveLimits,
+}
 
 /// Everything the service can be told.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,8 +63,10 @@ pub struct ServiceConfig {
     pub max_unpacked_bytes: usize,
     /// What reading one mesh may build at most.
     pub limits: Limits,
-    /// Bytes of memory that requests may take for computing, all together.
+    /// Bytes of memory that requests may take, all together: bodies, what is unpacked of them, computing, answers.
     pub memory_bytes: u64,
+    /// Bytes of memory that a reindex may take, the index that is served included.
+    pub indexing_memory_bytes: u64,
     /// Threads that answer queries and check uploads.
     pub query_threads: usize,
     /// Queries that may wait for a thread.
@@ -114,7 +124,8 @@ impl Default for ServiceConfig {
             max_upload_files: 2048,
             max_unpacked_bytes: 256 << 20,
             limits: Limits::default(),
-            memory_bytes: 2 << 30,
+            memory_bytes: 1536 << 20,
+            indexing_memory_bytes: jobs.memory_bytes,
             query_threads: cores,
             query_queue: 64,
             query_wait: Duration::from_secs(10),
@@ -160,6 +171,7 @@ impl ServiceConfig {
             indexing_threads: self.indexing_threads,
             queue_limit: self.job_queue,
             limits: self.limits,
+            memory_bytes: self.indexing_memory_bytes,
         }
     }
 }

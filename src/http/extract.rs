@@ -1,11 +1,14 @@
 //! axum's extractors with problems for rejections.
 
+use super::arriving::Arriving;
+use super::body::{body_too_large, broke_off, no_room, within};
 use super::problem::{Code, Problem};
 use super::query_string;
-use super::upload::body_too_large;
+use super::request_memory;
 use axum::extract::{FromRequest, FromRequestParts, Path, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, header};
+use futures_util::StreamExt;
 use serde::de::DeserializeOwned;
 use std::time::Duration;
 use utoipa::IntoParams;
@@ -69,18 +72,7 @@ impl<S: Send + Sync, T: DeserializeOwned + Default> FromRequest<S> for OptionalJ
 
 async fn body(request: Request) -> Result<bytes::Bytes, Problem> {
     let declared = media_type(request.headers());
-    let receiving = axum::body::to_bytes(request.into_body(), MAX_JSON_BYTES);
-    let bytes = tokio::time::timeout(JSON_WITHIN, receiving)
-        .await
-        .map_err(|_| {
-            let seconds = JSON_WITHIN.as_secs();
-            Problem::new(
-                Code::RequestTimeout,
-                format!("the body did not arrive within {seconds} s"),
-            )
-            .with("limit_seconds", seconds)
-        })?
-        .map_err(|_| body_too_large(MAX_JSON_BYTES))?;
+    let bytes = within(JSON_WITHIN, receive(request)).await?;
     match declared {
         _ if bytes.is_empty() => Ok(bytes),
         Some(declared) if is_json(&declared) => Ok(bytes),
@@ -112,6 +104,21 @@ fn is_json(media_type: &str) -> bool {
     media_type
         .strip_prefix("application/")
         .is_some_and(|kind| kind == "json" || kind.ends_with("+json"))
+}
+
+/// A body of at most [`MAX_JSON_BYTES`], counted as memory of the request.
+async fn receive(request: Request) -> Result<bytes::Bytes, Problem> {
+    let memory = request_memory::of(&request)?;
+    let mut body = Arriving::new(MAX_JSON_BYTES, &memory);
+    let mut pieces = request.into_body().into_data_stream();
+    while let Some(piece) = pieces.next().await {
+        let piece = piece.map_err(broke_off)?;
+        if body.len() + piece.len() > MAX_JSON_BYTES {
+            return Err(body_too_large(MAX_JSON_BYTES));
+        }
+        body.push(&piece).map_err(no_room)?;
+    }
+    Ok(body.into_bytes())
 }
 
 fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {

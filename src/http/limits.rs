@@ -6,7 +6,7 @@
 use super::auth::Caller;
 use super::problem::{Code, Problem};
 use crate::model::{KeyId, KeyLimits};
-use crate::store::Maker;
+use crate::store::{self, Maker, Store, StoreError};
 use axum::http::{HeaderName, HeaderValue};
 use axum::response::Response;
 use governor::clock::{Clock, DefaultClock};
@@ -119,6 +119,50 @@ impl Limits {
                 classes: key.limits.classes.or(self.defaults.classes),
             },
         })
+    }
+
+    /// Tells a caller that may make nothing more before its body is received. The store decides, in the transaction of
+    /// the change.
+    ///
+    /// # Errors
+    /// `quota_exceeded`; what keeps the records from being read.
+    pub fn require_room(&self, catalogue: &Store, caller: &Caller, more_classes: u64) -> Result<(), Problem> {
+        let Some(maker) = self.maker(caller) else {
+            return Ok(());
+        };
+        if maker.limits.classes.is_none() && maker.limits.stored_bytes.is_none() {
+            return Ok(());
+        }
+        let used = catalogue.usage(maker.key)?;
+        let checks = [
+            (
+                store::Quota::Classes,
+                maker.limits.classes,
+                used.classes,
+                more_classes,
+            ),
+            (
+                store::Quota::StoredBytes,
+                maker.limits.stored_bytes,
+                used.bytes,
+                1,
+            ),
+        ];
+        for (quota, limit, used, more) in checks {
+            if let Some(limit) = limit
+                && more > 0
+                && used.saturating_add(more) > limit
+            {
+                return Err(StoreError::QuotaExceeded {
+                    quota,
+                    limit,
+                    used,
+                    more,
+                }
+                .into());
+            }
+        }
+        Ok(())
     }
 }
 

@@ -82,6 +82,12 @@ fn describe() {
         "shapelex_compute_waiting",
         "Pieces of work waiting for a query thread"
     );
+    describe_gauge!(
+        "shapelex_memory_reserved_bytes",
+        "Memory that requests have reserved, bodies included"
+    );
+    describe_gauge!("shapelex_memory_limit_bytes", "Memory that requests may reserve");
+    describe_gauge!("shapelex_body_bytes", "Memory reserved for bodies");
     describe_gauge!("shapelex_connections", "Connections being served");
     describe_gauge!("shapelex_api_keys", "API keys, also expired ones");
     describe_gauge!("shapelex_jobs_pending", "Jobs waiting or being worked on");
@@ -196,6 +202,9 @@ pub fn render(state: &AppState) -> String {
     let live = state.jobs.live_index();
     gauge!("shapelex_compute_running").set(state.compute.running() as f64);
     gauge!("shapelex_compute_waiting").set(state.compute.waiting() as f64);
+    gauge!("shapelex_memory_reserved_bytes").set(state.memory.used() as f64);
+    gauge!("shapelex_memory_limit_bytes").set(state.memory.limit() as f64);
+    gauge!("shapelex_body_bytes").set(state.memory.bodies() as f64);
     gauge!("shapelex_connections").set(state.connections.len() as f64);
     gauge!("shapelex_api_keys").set(state.keys.len() as f64);
     gauge!("shapelex_jobs_pending").set(state.jobs.queue_depth() as f64);

@@ -3,9 +3,11 @@
 use super::audit::Entry;
 use super::auth::{Access, UNMATCHED, access_of, authorize, is_probe};
 use super::host;
+use super::linger::linger;
 use super::metrics;
 use super::origin;
 use super::problem::{Code, Problem};
+use super::request_memory::{self, Refusable, hold_answer};
 use super::state::AppState;
 use super::trace_context::{self, trace_parent};
 use crate::model::Scope;
@@ -31,7 +33,9 @@ pub fn id_of(request: &Request) -> Option<String> {
 /// The outermost layer.
 pub async fn around(State(state): State<AppState>, mut request: Request, next: Next) -> Response {
     let id = request_id(&request);
+    request = linger(request);
     request.extensions_mut().insert(RequestId(id.clone()));
+    request_memory::begin(&mut request, &state.memory);
     let operation = operation(&request);
     let method = request.method().clone();
     let path = request.uri().path().to_owned();
@@ -57,21 +61,24 @@ pub async fn around(State(state): State<AppState>, mut request: Request, next: N
         .and_then(|()| origin::check(&state, &request))
         .and(allowed)
         .and_then(|()| check_length(&request));
+    let writes = matches!(access, Access::Needs(scope) if scope > Scope::Read);
+    let writes = writes && method != Method::GET && method != Method::HEAD;
+    let refusable = if writes { Refusable::No } else { Refusable::Yes };
     let response = match allowed {
         Ok(()) => {
             if caller.key.is_some() {
                 span.record("key", caller.name());
             }
             request.extensions_mut().insert(caller.clone());
-            next.run(request).instrument(span.clone()).await
+            let response = next.run(request).instrument(span.clone()).await;
+            hold_answer(response, &state.memory, refusable)
         }
         Err(problem) => problem.into_response(),
     };
     let took = began.elapsed();
     let (mut response, outcome) = span.in_scope(|| finish(response, &id));
     let status = response.status();
-    let writes = matches!(access, Access::Needs(scope) if scope > Scope::Read);
-    if writes && method != Method::GET && method != Method::HEAD {
+    if writes {
         let entry = Entry::new(&id, &caller, operation, &path, status.as_u16(), outcome);
         state.audit.write(&entry);
     }

@@ -76,6 +76,8 @@ pub struct Parts {
     pub jobs: Jobs,
     /// Where requests compute.
     pub compute: Compute,
+    /// Where their archives are unpacked: as many at a time as there are query threads, and not in a query's way.
+    pub unpacking: Compute,
     /// What requests may take of the memory.
     pub memory: MemoryBudget,
     /// Held while a request reads the catalogue and then changes it by what it read.
@@ -177,11 +179,15 @@ impl AppState {
             }
             other => other?,
         };
-        let compute = Compute::new(ComputeOptions {
-            threads: config.query_threads,
-            queue: config.query_queue,
-            wait: config.query_wait,
-        })?;
+        let pool = |name| {
+            Compute::new(ComputeOptions {
+                name,
+                threads: config.query_threads,
+                queue: config.query_queue,
+                wait: config.query_wait,
+            })
+        };
+        let (compute, unpacking) = (pool("query")?, pool("unpack")?);
         let memory = MemoryBudget::new(config.memory_bytes);
         Ok(Self(Arc::new(Parts {
             memory,
@@ -193,6 +199,7 @@ impl AppState {
             local_token: LocalToken::new().map_err(OpenError::Randomness)?,
             jobs,
             compute,
+            unpacking,
             catalogue: Mutex::new(()),
             stopping: CancellationToken::new(),
             document_yaml,

@@ -1,26 +1,23 @@
 //! A request's body → the meshes in it, whichever way they were sent: raw, multipart, or an archive of them.
 
-use super::archive::{self, ArchiveKind, ArchiveLimits};
+use super::AppState;
+use super::admission::{Patience, Work};
+use super::archive::{self, ArchiveKind, Unpacking};
+use super::arriving::Arriving;
+use super::body::{body_too_large, broke_off, clean_name, media_type, most_bytes, no_room, within};
+use super::config::UploadLimits;
+use super::multipart::receive_multipart;
 use super::problem::{Code, Problem};
+use super::request_memory;
 use super::uploaded::{Part, UploadedMesh};
+use crate::memory::Reservation;
 use crate::mesh::{Format, MeshError};
 use crate::model::text::is_hidden;
-use axum::extract::{FromRequest, Multipart, Request};
+use axum::extract::Request;
 use axum::http::{HeaderMap, header};
-use bytes::BytesMut;
 use futures_util::StreamExt;
 use std::sync::Arc;
-use std::time::Duration;
 use tracing::{Instrument, info_span};
-
-/// What an upload may hold at most.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct UploadLimits {
-    /// Bytes of the whole body.
-    pub max_body_bytes: usize,
-    /// Members of an archive and their bytes; a multipart body has no more parts than that either.
-    pub archive: ArchiveLimits,
-}
 
 /// Everything a request brought.
 #[derive(Clone, Debug)]
@@ -33,38 +30,40 @@ pub struct Upload {
 
 /// Receives a request's body. `name` is what the client calls a raw body.
 ///
+/// The body counts against the memory of requests while it arrives, and so does what is unpacked of it while it comes
+/// out. What a caller can know without the body, it must have checked before.
+///
 /// # Errors
-/// `body_too_large`, `request_timeout`, `unsupported_media_type`, `empty_body`, `invalid_multipart`, `no_files`, and those of
-/// [`archive::unpack`].
-pub async fn receive(
-    request: Request,
-    name: Option<String>,
-    limits: UploadLimits,
-    time_limit: Duration,
-) -> Result<Upload, Problem> {
-    check_length(request.headers(), limits.max_body_bytes)?;
+/// `body_too_large`, `request_timeout`, `unsupported_media_type`, `empty_body`, `invalid_multipart`, `no_files`,
+/// `overloaded` where memory is short, and those of [`archive::unpack_within`].
+pub async fn receive(state: &AppState, request: Request, name: Option<String>) -> Result<Upload, Problem> {
+    let limits = state.config.upload_limits();
+    let memory = request_memory::of(&request)?;
+    let most = most_bytes(
+        request.headers(),
+        limits.max_body_bytes,
+        state.memory.body_limit(),
+    )?;
     let declared = media_type(request.headers());
     let receiving = async {
         if declared.as_deref() == Some("multipart/form-data") {
-            receive_multipart(request, &limits).await
+            receive_multipart(request, most, limits.archive.max_members, &memory).await
         } else {
-            Ok(vec![receive_raw(request, declared, name, &limits).await?])
+            Ok(vec![
+                receive_raw(request, declared, name, most, &limits, &memory).await?,
+            ])
         }
     };
-    let received = tokio::time::timeout(time_limit, receiving).instrument(info_span!("receive"));
-    let parts = received.await.map_err(|_| {
-        let seconds = time_limit.as_secs_f64();
-        Problem::new(
-            Code::RequestTimeout,
-            format!("the body did not arrive within {seconds:.1} s"),
-        )
-        .with("limit_seconds", seconds)
-    })??;
-    // Unpacking is neither quick nor numeric: off tokio's threads, but not in a query's way either.
+    let parts = within(state.config.upload_timeout, receiving)
+        .instrument(info_span!("receive"))
+        .await?;
     let span = info_span!("unpack");
-    tokio::task::spawn_blocking(move || span.in_scope(|| sort(parts, &limits)))
+    state
+        .unpacking
+        .run(Patience::Bounded, state.config.query_timeout, move |work| {
+            span.in_scope(|| sort(parts, &limits, work, &memory))
+        })
         .await
-        .map_err(Problem::internal)?
 }
 
 /// The single mesh of an upload.
@@ -82,38 +81,6 @@ pub fn only_mesh(upload: Upload) -> Result<UploadedMesh, Problem> {
         )
         .with("found", found)),
     }
-}
-
-/// The problem of a body longer than the limit.
-pub fn body_too_large(limit: usize) -> Problem {
-    Problem::new(
-        Code::BodyTooLarge,
-        format!("the body is longer than {limit} bytes"),
-    )
-    .with("limit_bytes", limit)
-}
-
-fn check_length(headers: &HeaderMap, limit: usize) -> Result<(), Problem> {
-    match content_length(headers) {
-        Some(length) if length > limit as u64 => Err(body_too_large(limit).with("body_bytes", length)),
-        _ => Ok(()),
-    }
-}
-
-fn content_length(headers: &HeaderMap) -> Option<u64> {
-    headers.get(header::CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
-}
-
-fn media_type(headers: &HeaderMap) -> Option<String> {
-    let value = headers.get(header::CONTENT_TYPE)?.to_str().ok()?;
-    Some(
-        value
-            .split(';')
-            .next()
-            .unwrap_or_default()
-            .trim()
-            .to_ascii_lowercase(),
-    )
 }
 
 /// Media types of a raw body. curl stamps `application/x-www-form-urlencoded` on every `--data-binary` that names no
@@ -150,7 +117,9 @@ async fn receive_raw(
     request: Request,
     declared: Option<String>,
     name: Option<String>,
+    most: usize,
     limits: &UploadLimits,
+    memory: &Reservation,
 ) -> Result<Part, Problem> {
     if let Some(declared) = &declared
         && !is_readable(declared)
@@ -165,18 +134,14 @@ async fn receive_raw(
         ));
     }
     let name = name.or_else(|| disposition_name(request.headers()));
-    // The declared length was checked against the limit; pages nobody writes to cost nothing.
-    let expected = content_length(request.headers()).unwrap_or(0);
-    let mut body = BytesMut::with_capacity(usize::try_from(expected).unwrap_or(0));
+    let mut body = Arriving::new(most, memory);
     let mut stream = request.into_body().into_data_stream();
-    while let Some(chunk) = stream.next().await {
-        let chunk = chunk.map_err(|e| {
-            Problem::new(Code::InvalidRequest, "the body broke off while it arrived").logged(e)
-        })?;
-        if body.len() + chunk.len() > limits.max_body_bytes {
+    while let Some(piece) = stream.next().await {
+        let piece = piece.map_err(broke_off)?;
+        if body.len() + piece.len() > limits.max_body_bytes {
             return Err(body_too_large(limits.max_body_bytes));
         }
-        body.extend_from_slice(&chunk);
+        body.push(&piece).map_err(no_room)?;
     }
     if body.is_empty() {
         return Err(MeshError::Empty.into());
@@ -184,52 +149,22 @@ async fn receive_raw(
     Ok(Part {
         name: clean_name(name.as_deref()),
         media_type: declared,
-        bytes: body.freeze(),
+        bytes: body.into_bytes(),
         packed: false,
     })
 }
 
-async fn receive_multipart(request: Request, limits: &UploadLimits) -> Result<Vec<Part>, Problem> {
-    let broken = |error: axum::extract::multipart::MultipartError| {
-        if error.status() == axum::http::StatusCode::PAYLOAD_TOO_LARGE {
-            body_too_large(limits.max_body_bytes)
-        } else {
-            Problem::new(Code::InvalidMultipart, error.body_text())
-        }
-    };
-    let mut multipart = Multipart::from_request(request, &())
-        .await
-        .map_err(|e| Problem::new(Code::InvalidMultipart, e.body_text()))?;
-    let mut parts = Vec::new();
-    while let Some(field) = multipart.next_field().await.map_err(broken)? {
-        if parts.len() >= limits.archive.max_members {
-            return Err(Problem::new(
-                Code::TooManyFiles,
-                format!("more than {} files were sent", limits.archive.max_members),
-            )
-            .with("limit_files", limits.archive.max_members));
-        }
-        let name = clean_name(field.file_name().or(field.name()));
-        let media_type = field.content_type().map(|t| {
-            t.split(';')
-                .next()
-                .unwrap_or_default()
-                .trim()
-                .to_ascii_lowercase()
-        });
-        let bytes = field.bytes().await.map_err(broken)?;
-        parts.push(Part {
-            name,
-            media_type,
-            bytes,
-            packed: false,
-        });
-    }
-    Ok(parts)
-}
-
 /// Unpacks archives and tells meshes, buffers and the rest apart.
-fn sort(parts: Vec<Part>, limits: &UploadLimits) -> Result<Upload, Problem> {
+fn sort(
+    parts: Vec<Part>,
+    limits: &UploadLimits,
+    work: &Work,
+    memory: &Arc<Reservation>,
+) -> Result<Upload, Problem> {
+    let unpacking = Unpacking {
+        cancel: &work.cancel,
+        memory,
+    };
     let mut files = Vec::new();
     let mut archive_limits = limits.archive;
     for part in parts {
@@ -238,7 +173,7 @@ fn sort(parts: Vec<Part>, limits: &UploadLimits) -> Result<Upload, Problem> {
             files.push(part);
             continue;
         };
-        for member in archive::unpack(kind, &part.bytes, &archive_limits)? {
+        for member in archive::unpack_within(kind, &part.bytes, &archive_limits, &unpacking)? {
             archive_limits.max_members = archive_limits.max_members.saturating_sub(1);
             archive_limits.max_bytes = archive_limits.max_bytes.saturating_sub(member.bytes.len());
             files.push(Part {
@@ -248,13 +183,17 @@ fn sort(parts: Vec<Part>, limits: &UploadLimits) -> Result<Upload, Problem> {
                 packed: true,
             });
         }
+        forget(part, memory);
     }
     let (mut meshes, mut buffers, mut ignored) = (Vec::new(), Vec::new(), Vec::new());
     for file in files {
         match role(&file) {
             Role::Mesh => meshes.push(file),
             Role::Buffer => buffers.push(file),
-            Role::Other => ignored.push(file.name),
+            Role::Other => {
+                ignored.push(file.name.clone());
+                forget(file, memory);
+            }
         }
     }
     if meshes.is_empty() {
@@ -272,9 +211,17 @@ fn sort(parts: Vec<Part>, limits: &UploadLimits) -> Result<Upload, Problem> {
             media_type: file.media_type.filter(|t| Format::from_media_type(t).is_some()),
             bytes: file.bytes,
             buffers: buffers.clone(),
+            memory: memory.clone(),
         })
         .collect();
     Ok(Upload { meshes, ignored })
+}
+
+/// Frees a file that is not needed any more, and what is reserved for it.
+fn forget(file: Part, memory: &Reservation) {
+    let bytes = file.bytes.len() as u64;
+    drop(file);
+    memory.shrink_body(bytes);
 }
 
 enum Role {
@@ -304,23 +251,4 @@ fn disposition_name(headers: &HeaderMap) -> Option<String> {
         let (key, value) = part.trim().split_once('=')?;
         (key.trim().eq_ignore_ascii_case("filename")).then(|| value.trim().trim_matches('"').to_owned())
     })
-}
-
-/// A name as it is kept: no folders from outside, no hidden characters, at most 200 characters.
-fn clean_name(name: Option<&str>) -> String {
-    let name: String = name
-        .unwrap_or_default()
-        .rsplit(['/', '\\'])
-        .next()
-        .unwrap_or_default()
-        .chars()
-        .filter(|&c| !is_hidden(c))
-        .take(200)
-        .collect();
-    let name = name.trim();
-    if name.is_empty() {
-        "mesh".to_owned()
-    } else {
-        name.to_owned()
-    }
 }

@@ -1,7 +1,10 @@
 //! A mesh as it was sent, and the buffers a glTF finds beside it.
 
+use super::problem::Problem;
+use crate::cancel::Cancel;
+use crate::memory::Reservation;
 use crate::mesh::gltf::external_buffers;
-use crate::mesh::{Companion, Format, MeshError, Pose, ReadContext, Source, TriangleSoup};
+use crate::mesh::{Companion, Format, Limits, Pose, ReadContext, Source, TriangleSoup};
 use bytes::Bytes;
 use std::sync::Arc;
 
@@ -28,29 +31,56 @@ pub struct UploadedMesh {
     /// Its contents.
     pub bytes: Bytes,
     pub(super) buffers: Arc<Vec<Part>>,
+    /// The memory of the request it came with.
+    pub(super) memory: Arc<Reservation>,
 }
 
-/// Bytes that reading, cleaning and simplifying take per byte of the file, at most. A triangle of a binary STL has 50
-/// bytes in the file; in memory it is three vertices of 24 bytes and three indices before welding, once more while it
-/// is welded, and edges and quadrics while it is simplified.
-const READING_FACTOR: u64 = 10;
+/// Bytes held per byte of the file while it is read, beside what the reader reserves for its arrays: small buffers and
+/// the allocator's slack.
+const READING_FACTOR: u64 = 1;
 
 impl UploadedMesh {
-    /// Memory that reading and preparing it takes, in bytes.
-    pub fn reading_bytes(&self) -> u64 {
+    /// What reading it works within: the service's limits, until it is stopped, and memory for this step of the
+    /// request's work.
+    pub fn context(&self, limits: Limits, cancel: &Cancel) -> ReadContext {
+        ReadContext {
+            cancel: cancel.clone(),
+            memory: Arc::new(self.memory.step()),
+            ..ReadContext::new(limits)
+        }
+    }
+
+    /// Reads it as one mesh, which stays reserved.
+    ///
+    /// # Errors
+    /// The reader's; `mesh_too_large` or `overloaded` where memory is short.
+    pub fn read(&self, context: &ReadContext) -> Result<(Format, TriangleSoup), Problem> {
+        let (format, soup) = {
+            let _floor = context.memory.hold(self.reading_bytes())?;
+            let companions = self.companions();
+            crate::mesh::read_within(&self.source(&companions), context)?
+        };
+        context.memory.grow(soup_bytes(&soup))?;
+        Ok((format, soup))
+    }
+
+    fn reading_bytes(&self) -> u64 {
         (self.bytes.len() as u64).saturating_mul(READING_FACTOR)
     }
 
-    /// Reads it as one mesh.
-    pub fn read(&self, context: &ReadContext) -> Result<(Format, TriangleSoup), MeshError> {
-        let companions = self.companions();
-        crate::mesh::read_within(&self.source(&companions), context)
-    }
-
     /// Samples poses of an animated glTF.
-    pub fn read_poses(&self, poses: usize, context: &ReadContext) -> Result<(Format, Vec<Pose>), MeshError> {
-        let companions = self.companions();
-        crate::mesh::read_poses_within(&self.source(&companions), poses, context)
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn read_poses(&self, poses: usize, context: &ReadContext) -> Result<(Format, Vec<Pose>), Problem> {
+        let (format, poses) = {
+            let _floor = context.memory.hold(self.reading_bytes())?;
+            let companions = self.companions();
+            crate::mesh::read_poses_within(&self.source(&companions), poses, context)?
+        };
+        let bytes = poses.iter().map(|pose| soup_bytes(&pose.soup)).sum();
+        context.memory.grow(bytes)?;
+        Ok((format, poses))
     }
 
     /// The file as the readers want it.
@@ -80,4 +110,9 @@ impl UploadedMesh {
             })
             .collect()
     }
+}
+
+/// Memory of a mesh as read, in bytes.
+fn soup_bytes(soup: &TriangleSoup) -> u64 {
+    (24 * soup.vertices.len() + 12 * soup.faces.len()) as u64
 }

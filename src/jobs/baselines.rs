@@ -1,12 +1,12 @@
 //! What the baselines need of an index: learnt with it, kept with its generation.
 
 use super::describe::Describer;
-use super::failure::ReindexError;
+use super::failure::{MEMORY_EXCEEDED, ReindexError, no_memory};
 use super::reindex::{Reindex, stop_if_cancelled};
 use crate::baseline::{BaselineModel, thinned};
+use crate::memory::MemoryError;
 use crate::model::{Generation, GenerationClass, Origin, Shape};
 use crate::store::{Store, StoreError};
-use rayon::prelude::*;
 
 /// Shapes at most that take part in finding what all share, evenly spread over the classes.
 const LEARNT_FROM: usize = 128;
@@ -59,11 +59,17 @@ pub(super) fn learn_baselines(
             (store.put_baseline_model(&model)?, model)
         }
     };
-    classes.par_iter().with_max_len(1).try_for_each(|class| {
+    let mut shapes = Vec::new();
+    for class in classes {
+        shapes.push(shapes_of(class)?);
+    }
+    let estimates: Vec<u64> = shapes.iter().map(|shapes| one_of(describer, shapes)).collect();
+    let described = describer.share.run(&estimates, |i, _| {
+        let class = &classes[i];
         stop_if_cancelled(request)?;
         let there = matches!(store.baseline_shapes(class, &key), Ok(Some(_)));
         if !there {
-            let described = shapes_of(class)?
+            let described = shapes[i]
                 .iter()
                 .filter_map(|shape| {
                     let description = describer.description(shape).ok()?;
@@ -75,7 +81,10 @@ pub(super) fn learn_baselines(
         }
         request.progress.advance();
         Ok::<(), ReindexError>(())
-    })?;
+    });
+    for class in described {
+        class.map_err(|error| too_large(&error))??;
+    }
     Ok(Some(key))
 }
 
@@ -87,6 +96,24 @@ fn has_imported(store: &Store, classes: &[GenerationClass], key: &str) -> bool {
         .any(|class| matches!(store.baseline_shapes(class, key), Ok(Some(shapes)) if !shapes.is_empty()))
 }
 
+/// Memory that a description of any of these shapes takes, made again where it is not kept any more.
+fn one_of<'a>(describer: &Describer<'_>, shapes: impl IntoIterator<Item = &'a Shape>) -> u64 {
+    let shapes = shapes.into_iter();
+    let each = shapes.map(|shape| {
+        describer
+            .shape_bytes(shape)
+            .max(2 * describer.description_bytes(shape))
+    });
+    each.max().unwrap_or(0)
+}
+
+fn too_large(error: &MemoryError) -> ReindexError {
+    ReindexError::failed(
+        MEMORY_EXCEEDED,
+        no_memory("describing shapes for the baselines", error),
+    )
+}
+
 /// Range and words of shapes evenly spread over the given ones.
 fn learn_model(
     request: &Reindex<'_>,
@@ -94,9 +121,13 @@ fn learn_model(
     shapes: &[Shape],
 ) -> Result<Option<BaselineModel>, ReindexError> {
     let taken = shapes.len().min(LEARNT_FROM);
-    let training: Vec<_> = (0..taken)
-        .into_par_iter()
-        .filter_map(|i| thinned(&describer.description(&shapes[i * shapes.len() / taken]).ok()?))
+    let taken: Vec<&Shape> = (0..taken).map(|i| &shapes[i * shapes.len() / taken]).collect();
+    let estimates: Vec<u64> = taken.iter().map(|&shape| one_of(describer, [shape])).collect();
+    let training: Vec<_> = describer
+        .share
+        .run(&estimates, |i, _| thinned(&describer.description(taken[i]).ok()?))
+        .into_iter()
+        .filter_map(|thinned| thinned.ok().flatten())
         .collect();
     stop_if_cancelled(request)?;
     if training.is_empty() {

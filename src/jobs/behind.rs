@@ -1,7 +1,7 @@
 //! What a start on a full disk could not do: read the index and the jobs, queue a reindex, write the ends of jobs. It is
 //! done once there is space.
 
-use super::{Inner, JobError, Jobs, live, worker};
+use super::{Inner, JobError, Jobs, LiveIndex, live, share, worker};
 use crate::model::{JobKind, ReindexScope};
 use crate::store::StoreError;
 use std::sync::Arc;
@@ -42,6 +42,7 @@ impl Inner {
 
     fn read(&self) -> Result<(), JobError> {
         let (live, lost) = live::load(&self.store)?;
+        warn_of_a_large_index(&live, self.options.memory_bytes);
         worker::requeue_interrupted(self)?;
         self.live.store(Arc::new(live));
         let mut state = self.state();
@@ -96,5 +97,18 @@ impl Jobs {
             Err(JobError::Store(StoreError::Full { .. })) => Ok(()),
             Err(error) => Err(error),
         }
+    }
+}
+
+/// Says that an index cannot be replaced by one as large within the memory for indexing, before a reindex fails of it.
+fn warn_of_a_large_index(live: &LiveIndex, memory_bytes: u64) {
+    let taken = live.generation.as_ref().map_or(0, share::index_bytes);
+    if taken > memory_bytes / 2 {
+        tracing::warn!(
+            index_mib = taken >> 20,
+            limit_mib = memory_bytes >> 20,
+            "the index takes more than half of the memory for indexing, so it cannot be replaced by one as large; raise \
+             --indexing-memory-mib"
+        );
     }
 }

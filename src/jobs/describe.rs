@@ -1,11 +1,14 @@
 //! Stored files → cached descriptions.
 
-use super::failure::{ReindexError, code, panic_text};
+use super::failure::{MEMORY_EXCEEDED, ReindexError, code, no_memory, panic_text};
 use super::progress::Progress;
+use super::share::Share;
 use crate::cancel::Cancel;
-use crate::mesh::{self, Companion, Format, Limits, Source, TriangleSoup};
+use crate::memory::{MemoryBudget, MemoryError};
+use crate::mesh::{self, Companion, Format, Limits, ReadContext, Source, TriangleSoup};
 use crate::model::{ContentHash, FailedShape, Shape};
 use crate::parameters::Parameters;
+use crate::pipeline::estimate::{self, Role};
 use crate::pipeline::{Description, PipelineError, StageSpan, describe_shape};
 use crate::store::{OriginalDamage, Store, StoreError};
 use bytes::Bytes;
@@ -13,8 +16,8 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// The code of a file that could not be opened because too many are.
 const OUT_OF_DESCRIPTORS: &str = "out_of_descriptors";
@@ -49,6 +52,12 @@ impl Failure {
     }
 }
 
+impl From<MemoryError> for Failure {
+    fn from(error: MemoryError) -> Self {
+        Self::new(MEMORY_EXCEEDED, no_memory("describing the shape", &error))
+    }
+}
+
 impl From<PipelineError> for Failure {
     fn from(error: PipelineError) -> Self {
         Self::new(code(&error), error.to_string())
@@ -62,6 +71,8 @@ pub(super) struct Describer<'a> {
     pub(super) parameters: &'a Parameters,
     pub(super) fingerprint: String,
     pub(super) cancel: &'a Cancel,
+    /// What is left of the memory for reindexing beside the index that is served.
+    pub(super) share: Share,
 }
 
 /// What describing many shapes came to.
@@ -88,53 +99,61 @@ impl Describer<'_> {
             let of = shape.pose.as_ref().map(|pose| pose.of);
             sources.entry((source.identity(), of)).or_default().push(shape);
         }
-        let (computed, cached) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let failures = Mutex::new(BTreeMap::new());
-        let sources: Vec<_> = sources.into_values().collect();
-        sources.par_iter().with_max_len(1).for_each(|poses| {
-            let (there, missing): (Vec<&Shape>, Vec<&Shape>) = poses
-                .iter()
-                .partition(|s| self.store.has_signatures(s.identity(), &self.fingerprint));
-            cached.fetch_add(there.len(), Ordering::Relaxed);
-            there.iter().for_each(|_| progress.advance());
-            if missing.is_empty() || self.cancel.is_cancelled() {
-                return;
-            }
-            let soups = guarded(|| self.read(&missing));
-            missing.par_iter().enumerate().for_each(|(i, shape)| {
-                let _span =
-                    tracing::info_span!(parent: progress.step(), "describe", shape = %shape.id).entered();
-                let described = match &soups {
-                    Ok(soups) => guarded(|| self.describe(shape, soups[i].clone())),
-                    Err(failure) => Err(failure.clone()),
-                };
-                match described {
-                    Ok(_) => {
-                        computed.fetch_add(1, Ordering::Relaxed);
-                    }
-                    Err(failure) => {
-                        // Only inserts happen under this lock, and they do not panic.
-                        if let Ok(mut failures) = failures.lock() {
-                            failures.insert(shape.identity(), failure);
-                        }
-                    }
-                }
-                progress.advance();
-            });
-        });
+        let sources: Vec<Vec<&Shape>> = sources.into_values().collect();
+        let work = Describing {
+            describer: self,
+            progress,
+            failures: Mutex::default(),
+            computed: AtomicUsize::new(0),
+            cached: AtomicUsize::new(0),
+        };
+        // One whose file takes more to read than most of its length has the whole share for itself.
+        let again = work.run(&sources, self.share);
+        let again: Vec<Vec<&Shape>> = again.into_iter().map(|i| sources[i].clone()).collect();
+        let failed = work.run(&again, self.share.alone());
+        for poses in failed.into_iter().map(|i| &again[i]) {
+            let needed = self.source_bytes(poses).max(self.share.bytes + 1);
+            let limit = self.share.bytes;
+            work.fail(poses, &MemoryError::NeverFits { needed, limit }.into());
+        }
         if self.cancel.is_cancelled() {
             return Err(ReindexError::Cancelled);
         }
-        let failures = failures.into_inner().unwrap_or_default();
+        let failures = work.failures.into_inner().unwrap_or_default();
         // The file is fine; without it the class would be learnt from less than it has.
         if let Some(failure) = failures.values().find(|failure| failure.is_passing()) {
             return Err(ReindexError::Later(failure.detail.clone()));
         }
         Ok(Described {
             failures,
-            computed: computed.into_inner(),
-            cached: cached.into_inner(),
+            computed: work.computed.into_inner(),
+            cached: work.cached.into_inner(),
         })
+    }
+
+    /// Memory that reading a file and describing the poses of it takes at most, in bytes.
+    fn source_bytes(&self, poses: &[&Shape]) -> u64 {
+        let largest = poses.iter().map(|shape| self.shape_bytes(shape)).max();
+        let side_by_side = poses.len().min(self.share.threads) as u64;
+        let soups: u64 = poses.iter().map(|shape| soup_bytes(shape)).sum();
+        let file = poses.first().map_or(0, |shape| shape.bytes);
+        FILE_COPIES * file + 2 * soups + side_by_side * largest.unwrap_or(0)
+    }
+
+    /// Memory that describing a shape takes at most, in bytes, its file not counted.
+    pub(super) fn shape_bytes(&self, shape: &Shape) -> u64 {
+        let (vertices, faces) = (shape.report.input_vertices, shape.report.input_faces);
+        estimate::preparing_bytes(vertices, faces).max(estimate::describing_bytes(
+            vertices,
+            self.parameters,
+            Role::Training,
+        ))
+    }
+
+    /// Memory that a shape's description takes at most, in bytes.
+    pub(super) fn description_bytes(&self, shape: &Shape) -> u64 {
+        let vertices = estimate::prepared_vertices(shape.report.input_vertices, self.parameters);
+        estimate::description_bytes(vertices, self.parameters, Role::Training)
     }
 
     /// A shape's description, from the cache where it is there.
@@ -143,7 +162,9 @@ impl Describer<'_> {
             return Ok(description);
         }
         guarded(|| {
-            let soup = self.read(&[shape])?.remove(0);
+            let soup = self
+                .read(&[shape], &MemoryBudget::new(self.share.bytes))?
+                .remove(0);
             self.describe(shape, soup)
         })
     }
@@ -162,10 +183,16 @@ impl Describer<'_> {
     }
 
     /// The meshes of shapes that come from one file, in their order.
-    fn read(&self, shapes: &[&Shape]) -> Result<Vec<TriangleSoup>, Failure> {
+    fn read(&self, shapes: &[&Shape], budget: &MemoryBudget) -> Result<Vec<TriangleSoup>, Failure> {
         let Some(shape) = shapes.first() else {
             return Ok(Vec::new());
         };
+        let context = ReadContext {
+            cancel: self.cancel.clone(),
+            memory: Arc::new(budget.reservation()),
+            ..ReadContext::new(*self.limits)
+        };
+        context.memory.grow(shape.bytes)?;
         let load = |content| {
             self.store
                 .original(content)
@@ -190,10 +217,10 @@ impl Describer<'_> {
         };
         let unusable = |e: mesh::MeshError| Failure::from(PipelineError::from(e));
         let Some(pose) = &shape.pose else {
-            let (_, soup) = mesh::read(&source, self.limits).map_err(unusable)?;
+            let (_, soup) = mesh::read_within(&source, &context).map_err(unusable)?;
             return Ok(vec![soup; shapes.len()]);
         };
-        let (_, poses) = mesh::read_poses(&source, pose.of, self.limits).map_err(unusable)?;
+        let (_, poses) = mesh::read_poses_within(&source, pose.of, &context).map_err(unusable)?;
         shapes
             .iter()
             .map(|shape| {
@@ -220,6 +247,86 @@ fn original_failure(error: &StoreError) -> &'static str {
         StoreError::Denied { .. } => "storage_denied",
         StoreError::OutOfDescriptors { .. } => OUT_OF_DESCRIPTORS,
         _ => "file_unreadable",
+    }
+}
+
+/// A file is held as stored, and its parts again while they are decoded and parsed.
+const FILE_COPIES: u64 = 4;
+
+/// Memory of a shape's mesh as read, in bytes.
+fn soup_bytes(shape: &Shape) -> u64 {
+    (24 * shape.report.input_vertices + 12 * shape.report.input_faces) as u64
+}
+
+/// Many files being described.
+struct Describing<'a> {
+    describer: &'a Describer<'a>,
+    progress: &'a Progress,
+    failures: Mutex<BTreeMap<ContentHash, Failure>>,
+    computed: AtomicUsize,
+    cached: AtomicUsize,
+}
+
+impl Describing<'_> {
+    /// Describes what fits; returns the numbers of the files for which there was too little memory.
+    fn run(&self, sources: &[Vec<&Shape>], share: Share) -> Vec<usize> {
+        let estimates: Vec<u64> = sources
+            .iter()
+            .map(|poses| self.describer.source_bytes(poses))
+            .collect();
+        let results = share.run(&estimates, |i, budget| self.source(&sources[i], budget));
+        let too_little =
+            |(i, fits): (usize, Result<bool, MemoryError>)| (!fits.unwrap_or(false)).then_some(i);
+        results.into_iter().enumerate().filter_map(too_little).collect()
+    }
+
+    /// Describes the poses of one file; `false` where reading it would take more than the budget.
+    fn source(&self, poses: &[&Shape], budget: &MemoryBudget) -> bool {
+        let describer = self.describer;
+        let (there, missing): (Vec<&Shape>, Vec<&Shape>) = poses.iter().partition(|s| {
+            describer
+                .store
+                .has_signatures(s.identity(), &describer.fingerprint)
+        });
+        if !missing.is_empty() && !describer.cancel.is_cancelled() {
+            let soups = match guarded(|| describer.read(&missing, budget)) {
+                Err(failure) if failure.code == MEMORY_EXCEEDED => return false,
+                other => other,
+            };
+            missing
+                .par_iter()
+                .enumerate()
+                .for_each(|(i, shape)| self.shape(shape, soups.as_ref().map(|soups| &soups[i])));
+        }
+        self.cached.fetch_add(there.len(), Ordering::Relaxed);
+        there.iter().for_each(|_| self.progress.advance());
+        true
+    }
+
+    fn shape(&self, shape: &Shape, soup: Result<&TriangleSoup, &Failure>) {
+        let _span =
+            tracing::info_span!(parent: self.progress.step(), "describe", shape = %shape.id).entered();
+        let described = match soup {
+            Ok(soup) => guarded(|| self.describer.describe(shape, soup.clone())),
+            Err(failure) => Err(failure.clone()),
+        };
+        match described {
+            Ok(_) => {
+                self.computed.fetch_add(1, Ordering::Relaxed);
+                self.progress.advance();
+            }
+            Err(failure) => self.fail(&[shape], &failure),
+        }
+    }
+
+    fn fail(&self, shapes: &[&Shape], failure: &Failure) {
+        for shape in shapes {
+            // Only inserts happen under this lock, and they do not panic.
+            if let Ok(mut failures) = self.failures.lock() {
+                failures.insert(shape.identity(), failure.clone());
+            }
+            self.progress.advance();
+        }
     }
 }
 

@@ -1,5 +1,7 @@
 //! Why a reindex ended early, and the stable names of failures.
 
+use crate::memory::MemoryError;
+use crate::mesh::MeshError;
 use crate::model::JobFailure;
 use crate::pipeline::PipelineError;
 use crate::store::StoreError;
@@ -39,10 +41,19 @@ impl From<StoreError> for ReindexError {
     }
 }
 
+/// The code of what does not fit the memory for reindexing.
+pub(super) const MEMORY_EXCEEDED: &str = "memory_exceeded";
+
+/// Says what does not fit, by how much, and what to do.
+pub(super) fn no_memory(what: &str, error: &MemoryError) -> String {
+    format!("{what}: {error}; lower the parameters or raise --indexing-memory-mib")
+}
+
 /// The stable name of a stage's failure.
 pub(super) fn code(error: &PipelineError) -> &'static str {
     match error {
         PipelineError::Cancelled(_) => "cancelled",
+        PipelineError::Mesh(MeshError::Memory(_)) => MEMORY_EXCEEDED,
         PipelineError::Mesh(_) => "mesh_unusable",
         PipelineError::Spectral(_) => "spectrum_failed",
         PipelineError::Coding(_) => "coding_failed",

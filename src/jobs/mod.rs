@@ -15,6 +15,7 @@ mod plan;
 mod priority;
 mod progress;
 mod reindex;
+mod share;
 mod trim;
 mod worker;
 
@@ -43,16 +44,19 @@ pub struct JobOptions {
     pub queue_limit: usize,
     /// What reading a shape's file may build.
     pub limits: Limits,
+    /// Bytes of memory a reindex may take, the index that is served included.
+    pub memory_bytes: u64,
 }
 
 impl Default for JobOptions {
-    /// One thread less than there are cores, at least one; 1000 waiting jobs; the default limits.
+    /// One thread less than there are cores, at least one; 1000 waiting jobs; the default limits; 512 MiB.
     fn default() -> Self {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Self {
             indexing_threads: cores.saturating_sub(1).max(1),
             queue_limit: 1000,
             limits: Limits::default(),
+            memory_bytes: 512 << 20,
         }
     }
 }

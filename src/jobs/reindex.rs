@@ -1,30 +1,34 @@
 //! Learning the index: describe the shapes, learn the classes, switch.
 
 use super::baselines::learn_baselines;
-use super::describe::Describer;
-use super::failure::{ReindexError, code};
+use super::describe::{Described, Describer, Failure};
+use super::failure::{MEMORY_EXCEEDED, ReindexError, code, no_memory};
 use super::live::{LiveIndex, calibration, load_baselines};
 use super::plan::{Plan, ToLearn, plan, shape_key, skipped};
 use super::progress::Progress;
+use super::share::{Share, index_bytes};
 use super::trim;
 use crate::cancel::Cancel;
+use crate::memory::MemoryError;
 use crate::mesh::Limits;
 use crate::model::{
     FailedShape, Generation, GenerationClass, GenerationShape, Origin, ReindexReport, ReindexScope,
     RelearnedClass, Shape, SkippedClass,
 };
 use crate::parameters::Parameters;
+use crate::pipeline::estimate;
 use crate::pipeline::{Description, PipelineError, held_out_scores, learn_model};
 use crate::store::{Store, StoreError};
 use arc_swap::ArcSwap;
 use jiff::Timestamp;
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// What is asked, and with what.
 pub(super) struct Reindex<'a> {
     pub(super) store: &'a Store,
     pub(super) limits: &'a Limits,
+    /// The memory for reindexing, the index that is served included.
+    pub(super) share: Share,
     pub(super) cancel: &'a Cancel,
     pub(super) progress: &'a Progress,
     pub(super) scope: &'a ReindexScope,
@@ -67,7 +71,9 @@ pub(super) fn reindex(request: &Reindex<'_>, live: &ArcSwap<LiveIndex>) -> Resul
     };
     let mut classes = keep;
     let kept = classes.len();
+    let served = live.load().generation.as_ref().map_or(0, index_bytes);
     let describer = Describer {
+        share: request.share.beside(served),
         store,
         limits: request.limits,
         parameters: &parameters,
@@ -78,7 +84,7 @@ pub(super) fn reindex(request: &Reindex<'_>, live: &ArcSwap<LiveIndex>) -> Resul
     let baselines = learn_baselines(request, &describer, current.as_ref(), &classes, kept)?;
     stop_if_cancelled(request)?;
     request.progress.begin("switch", 1);
-    let generation = switch(store, current, parameters, classes, baselines, live)?;
+    let generation = switch(request, current, parameters, classes, baselines, live)?;
     request.progress.advance();
     Ok(Outcome { generation, report })
 }
@@ -100,41 +106,10 @@ fn learn_classes(
     let described = describer.describe_all(&shapes, request.progress)?;
     report.described = described.computed;
     report.described_before = described.cached;
-    if !shapes.is_empty()
-        && shapes
-            .iter()
-            .all(|shape| described.failures.contains_key(&shape.identity()))
-    {
-        let first = described.failures.values().next();
-        return Err(ReindexError::failed(
-            "all_shapes_failed",
-            format!(
-                "none of {} shapes could be described; the first: {}",
-                shapes.len(),
-                first.map_or("", |failure| &failure.detail)
-            ),
-        ));
-    }
+    check_any_described(&shapes, &described)?;
 
     request.progress.begin("learn classes", learn.len());
-    let learnt: Vec<Learnt> = learn
-        .par_iter()
-        .with_max_len(1)
-        .map(|class| {
-            let mut failed = Vec::new();
-            let mut good = Vec::new();
-            for shape in &class.shapes {
-                match described.failures.get(&shape.identity()) {
-                    Some(failure) => failed.push(failure.of(shape)),
-                    None => good.push(shape),
-                }
-            }
-            let learnt = learn_class(request, describer, class, &good, failed);
-            request.progress.advance();
-            learnt
-        })
-        .collect::<Result<_, ReindexError>>()?;
-
+    let learnt = learn_each(request, describer, learn, &described)?;
     let tried = learnt.len();
     for learnt in learnt {
         let failed = match learnt {
@@ -163,6 +138,84 @@ fn learn_classes(
     }
     classes.sort_by_key(|class| class.class);
     Ok(())
+}
+
+/// Fails where shapes were to be described and none could be.
+fn check_any_described(shapes: &[&Shape], described: &Described) -> Result<(), ReindexError> {
+    if !shapes.is_empty()
+        && shapes
+            .iter()
+            .all(|shape| described.failures.contains_key(&shape.identity()))
+    {
+        let first = described.failures.values().next();
+        let memory = |failure: &Failure| failure.code == MEMORY_EXCEEDED;
+        let code = match described.failures.values().all(memory) {
+            true => MEMORY_EXCEEDED,
+            false => "all_shapes_failed",
+        };
+        return Err(ReindexError::failed(
+            code,
+            format!(
+                "none of {} shapes could be described; the first: {}",
+                shapes.len(),
+                first.map_or("", |failure| &failure.detail)
+            ),
+        ));
+    }
+    Ok(())
+}
+
+/// Learns classes from what was described of them, as many side by side as fit the memory.
+fn learn_each(
+    request: &Reindex<'_>,
+    describer: &Describer<'_>,
+    learn: &[ToLearn],
+    described: &Described,
+) -> Result<Vec<Learnt>, ReindexError> {
+    let estimates: Vec<u64> = learn.iter().map(|class| class_bytes(describer, class)).collect();
+    describer
+        .share
+        .run(&estimates, |i, _| {
+            let class = &learn[i];
+            let mut failed = Vec::new();
+            let mut good = Vec::new();
+            for shape in &class.shapes {
+                match described.failures.get(&shape.identity()) {
+                    Some(failure) => failed.push(failure.of(shape)),
+                    None => good.push(shape),
+                }
+            }
+            let learnt = learn_class(request, describer, class, &good, failed);
+            request.progress.advance();
+            learnt
+        })
+        .into_iter()
+        .enumerate()
+        .map(|(i, learnt)| learnt.map_err(|error| too_large(&learn[i], &error))?)
+        .collect::<Result<_, ReindexError>>()
+}
+
+/// Memory that learning a class takes at most, in bytes.
+fn class_bytes(describer: &Describer<'_>, class: &ToLearn) -> u64 {
+    let parameters = describer.parameters;
+    let of = |shape: &Shape| {
+        let vertices = estimate::prepared_vertices(shape.report.input_vertices, parameters);
+        estimate::training_signatures(vertices, parameters)
+    };
+    let signatures = class.shapes.iter().map(of).sum();
+    let each = class.shapes.iter().map(|s| describer.description_bytes(s));
+    let (descriptions, largest) = each.fold((0, 0), |(sum, largest): (u64, u64), bytes| {
+        (sum + bytes, largest.max(bytes))
+    });
+    // One that is not kept any more is made again.
+    let again = class.shapes.iter().map(|s| describer.shape_bytes(s)).max();
+    estimate::learning_bytes(descriptions, largest, signatures, parameters)
+        .max(descriptions + again.unwrap_or(0))
+}
+
+fn too_large(class: &ToLearn, error: &MemoryError) -> ReindexError {
+    let what = format!("learning class '{}'", class.class.name.as_str());
+    ReindexError::failed(MEMORY_EXCEEDED, no_memory(&what, error))
 }
 
 fn learn_class(
@@ -265,13 +318,14 @@ fn learn_shape(
 /// Makes the new generation current, in the store and in memory. Where it would be the current one over again, that
 /// one stays.
 fn switch(
-    store: &Store,
+    request: &Reindex<'_>,
     current: Option<Generation>,
     parameters: Parameters,
     mut classes: Vec<GenerationClass>,
     baselines: Option<String>,
     live: &ArcSwap<LiveIndex>,
 ) -> Result<Option<u64>, ReindexError> {
+    let store = request.store;
     // Classes that were deleted while they were learnt.
     let existing = store.list_classes(None, usize::MAX)?;
     classes.retain(|class| existing.iter().any(|e| e.id == class.class));
@@ -295,6 +349,15 @@ fn switch(
         classes,
         baselines,
     };
+    // Both are in memory while queries change over.
+    let before = live.load().generation.as_ref().map_or(0, index_bytes);
+    let needed = before + index_bytes(&generation);
+    let limit = request.share.bytes;
+    if needed > limit {
+        let error = MemoryError::NeverFits { needed, limit };
+        let detail = no_memory("the new index beside the one that is served", &error);
+        return Err(ReindexError::failed(MEMORY_EXCEEDED, detail));
+    }
     // Loaded before the switch, so that nothing can fail after it.
     let index = store.load_index(&generation)?;
     let baselines = load_baselines(store, &generation)?;

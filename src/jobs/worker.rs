@@ -3,6 +3,7 @@
 use super::failure::{ReindexError, panic_text};
 use super::progress::Progress;
 use super::reindex::{Outcome, Reindex, reindex};
+use super::share::Share;
 use super::{Inner, JobError, Running};
 use crate::cancel::Cancel;
 use crate::model::{Job, JobFailure, JobId, JobKind, JobState};
@@ -148,6 +149,10 @@ fn work(inner: &Inner, channel: &watch::Sender<Job>, cancel: &Cancel) -> Result<
     let request = Reindex {
         store: &inner.store,
         limits: &inner.options.limits,
+        share: Share {
+            bytes: inner.options.memory_bytes,
+            threads: inner.options.indexing_threads.max(1),
+        },
         cancel,
         progress: &progress,
         scope,

@@ -4,6 +4,7 @@
 
 pub mod describe;
 pub mod error;
+pub mod estimate;
 pub mod held_out;
 pub mod judge;
 pub mod learn;

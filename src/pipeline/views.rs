@@ -11,9 +11,9 @@ use crate::signature::normalise::normalise;
 use crate::spectral::Eigenpairs;
 
 /// Full area over visible area, as assumed for an open query (method, step 10).
-const AREA_SCALES: [f64; 4] = [2.0, 2.5, 3.0, 4.0];
+pub(super) const AREA_SCALES: [f64; 4] = [2.0, 2.5, 3.0, 4.0];
 /// Energies of the fixed grid.
-const FIXED_ENERGIES: usize = 100;
+pub(super) const FIXED_ENERGIES: usize = 100;
 /// σ on the fixed grid, in units of log λ.
 const FIXED_SIGMA: f64 = 0.27;
 /// Highest energy of the fixed grid: the logarithm of this many times n. Weyl's law has λ_n = 4π n on a closed surface of

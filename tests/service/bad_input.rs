@@ -163,25 +163,26 @@ async fn bad_meshes_have_their_own_problems_in_uploads_and_queries() {
     assert_eq!(answer["classes"][0]["class"]["name"], "bean");
 }
 
+/// Where a body is received without an index.
+const UPLOAD: &str = "/v1/classes/bean/shapes?create=true";
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_body_over_the_limit_is_refused_however_it_is_sent() {
     let app = App::with(|c| c.max_body_bytes = 10_000);
     let long = vec![b'x'; 10_001];
-    let raw = app.post("/v1/query", "model/off", long.clone()).await;
+    let raw = app.post(UPLOAD, "model/off", long.clone()).await;
     assert_eq!(raw.fails(413, "body_too_large")["limit_bytes"], 10_000);
-    let declared = Request::post("/v1/query")
+    let declared = Request::post(UPLOAD)
         .header("content-type", "model/off")
         .header("content-length", "99999999999")
         .body(Body::empty())
         .unwrap();
     app.send(declared).await.fails(413, "body_too_large");
     let chunks = futures_util::stream::iter((0..20).map(|_| Ok::<_, std::io::Error>(vec![b'x'; 1000])));
-    let chunked = app
-        .post("/v1/query", "model/off", Body::from_stream(chunks))
-        .await;
+    let chunked = app.post(UPLOAD, "model/off", Body::from_stream(chunks)).await;
     chunked.fails(413, "body_too_large");
     let (media_type, body) = multipart(&[("a.off", &long)]);
-    let form = app.post("/v1/query", &media_type, body).await;
+    let form = app.post(UPLOAD, &media_type, body).await;
     assert_eq!(form.fails(413, "body_too_large")["limit_bytes"], 10_000);
     let json = format!("{{\"name\": \"{}\"}}", "x".repeat(300_000));
     let json = app.post("/v1/classes", "application/json", json).await;
@@ -203,9 +204,7 @@ async fn a_mesh_over_the_limit_is_refused_with_the_numbers() {
 async fn a_body_that_never_ends_is_given_up() {
     let app = App::with(|c| c.upload_timeout = std::time::Duration::from_millis(50));
     let stalled = futures_util::stream::pending::<Result<Vec<u8>, std::io::Error>>();
-    let answer = app
-        .post("/v1/query", "model/off", Body::from_stream(stalled))
-        .await;
+    let answer = app.post(UPLOAD, "model/off", Body::from_stream(stalled)).await;
     answer.fails(408, "request_timeout");
 }
 

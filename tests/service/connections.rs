@@ -8,14 +8,17 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 
-struct Running {
-    address: SocketAddr,
+/// A service that listens. Its directory goes with it.
+pub struct Running {
+    pub address: SocketAddr,
+    pub state: AppState,
     stop: Option<oneshot::Sender<()>>,
     served: JoinHandle<()>,
     _directory: tempfile::TempDir,
 }
 
-async fn start(change: impl FnOnce(&mut ServiceConfig)) -> Running {
+/// Starts one, changed as said, on a free port.
+pub async fn start(change: impl FnOnce(&mut ServiceConfig)) -> Running {
     let directory = tempfile::tempdir().unwrap();
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
@@ -30,6 +33,7 @@ async fn start(change: impl FnOnce(&mut ServiceConfig)) -> Running {
     change(&mut config);
     let state = AppState::open(config).unwrap();
     let (stop, stopped) = oneshot::channel::<()>();
+    let shared = state.clone();
     let served = tokio::spawn(async move {
         let shutdown = async {
             let _ = stopped.await;
@@ -38,6 +42,7 @@ async fn start(change: impl FnOnce(&mut ServiceConfig)) -> Running {
     });
     Running {
         address,
+        state: shared,
         stop: Some(stop),
         served,
         _directory: directory,

@@ -5,6 +5,7 @@ mod answers;
 mod bad_input;
 mod baselines;
 mod batch;
+mod bodies;
 mod catalogue;
 mod connections;
 mod contract;

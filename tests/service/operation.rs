@@ -126,6 +126,56 @@ async fn a_full_house_turns_away_and_says_when_to_come_back() {
     assert_eq!(refused.header("retry-after"), "30");
 }
 
+/// A grid of `side`² vertices with bumps, as OFF.
+fn scan(side: usize) -> Vec<u8> {
+    let mut text = format!("OFF\n{} {} 0\n", side * side, 2 * (side - 1) * (side - 1));
+    for i in 0..side * side {
+        let (x, y) = ((i % side) as f64, (i / side) as f64);
+        text += &format!("{x} {y} {}\n", 8.0 * (0.07 * x).sin() * (0.05 * y).cos());
+    }
+    for i in 0..side - 1 {
+        for j in 0..side - 1 {
+            let a = i * side + j;
+            text += &format!("3 {a} {} {}\n", a + 1, a + side + 1);
+            text += &format!("3 {a} {} {}\n", a + side + 1, a + side);
+        }
+    }
+    text.into_bytes()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_thread_is_free_soon_after_the_deadline_in_whatever_stage() {
+    let indexed = App::indexed().await;
+    let parameters = json!({"eigenpairs": 400, "part_eigenpairs": 400, "working_size": 20_000, "atoms": 12,
+                            "iterations": 2, "samples_per_shape": 100});
+    let job = indexed.reindex(json!({"parameters": parameters})).await;
+    assert_eq!(job["state"], "succeeded", "{job}");
+    let scan = scan(400);
+    let mut freed = Vec::new();
+    for milliseconds in [5, 30, 80, 150, 300, 600, 1000] {
+        let limit = Duration::from_millis(milliseconds);
+        let state = indexed.state.clone();
+        let body = scan.clone();
+        // As a client that leaves does it: the request is dropped.
+        let left = tokio::time::timeout(limit, indexed.post("/v1/query", "model/off", body)).await;
+        let began = std::time::Instant::now();
+        // What was reserved is given back, too.
+        while state.compute.running() + state.unpacking.running() > 0 || state.memory.used() > 0 {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+        println!(
+            "left after {limit:?}: free after {:?}, {}",
+            began.elapsed(),
+            left.is_err()
+        );
+        freed.push(began.elapsed());
+    }
+    freed.sort_unstable();
+    let median = freed[freed.len() / 2];
+    assert!(median < Duration::from_millis(100), "{freed:?}");
+    assert!(freed[freed.len() - 1] < Duration::from_secs(1), "{freed:?}");
+}
+
 #[tokio::test]
 async fn a_mesh_that_does_not_fit_the_memory_is_refused_before_it_is_built() {
     let app = App::with(|config| config.memory_bytes = 200 << 10);
@@ -171,4 +221,42 @@ async fn metrics_tell_of_the_process_the_build_the_jobs_and_the_verdicts() {
         .iter()
         .sum();
     assert!(value("shapelex_query_p_value_count") >= judged.min(1.0));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_reindex_that_does_not_fit_its_memory_fails_and_names_the_numbers() {
+    let app = App::with(|config| config.indexing_memory_bytes = 48 << 20);
+    for class in crate::meshes::CLASSES {
+        for pose in 0..2 {
+            let path = format!("/v1/classes/{class}/shapes?create=true&name={pose}.off");
+            let answer = app
+                .post(&path, "model/off", crate::meshes::off(class, pose))
+                .await;
+            assert_eq!(answer.status, 201, "{}", answer.text());
+        }
+    }
+    // What fits runs, if need be one shape at a time.
+    let job = app.reindex(json!({"parameters": crate::harness::small()})).await;
+    assert_eq!(job["state"], "succeeded", "{job}");
+    for (parameter, value) in [("refine_below", 100_000), ("atoms", 5000)] {
+        let mut parameters = crate::harness::small();
+        parameters[parameter] = json!(value);
+        parameters["samples_per_shape"] = json!(0);
+        parameters["energies"] = json!(2000);
+        let job = app
+            .reindex(json!({"scope": "all", "parameters": parameters}))
+            .await;
+        assert_eq!(job["state"], "failed", "{parameter}: {job}");
+        assert_eq!(job["failure"]["code"], "memory_exceeded", "{parameter}: {job}");
+        let detail = job["failure"]["detail"].as_str().unwrap();
+        assert!(
+            detail.contains("MiB") && detail.contains("--indexing-memory-mib"),
+            "{detail}"
+        );
+    }
+    // The index that is served stays.
+    let answer = app
+        .post("/v1/query", "model/off", crate::meshes::off("bean", 5))
+        .await;
+    assert_eq!(answer.status, 200, "{}", answer.text());
 }

@@ -178,19 +178,20 @@ async fn begin(
         }
     }
     let left = state.limits.take_queries(caller, 1)?;
-    let upload = upload::receive(
-        request,
-        options.name.clone(),
-        state.config.upload_limits(),
-        state.config.upload_timeout,
-    )
-    .await?;
+    answerable(state)?;
+    let upload = upload::receive(state, request, options.name.clone()).await?;
+    // What was switched in while the body arrived.
+    Ok((answerable(state)?, upload, left))
+}
+
+/// The index there is now.
+fn answerable(state: &AppState) -> Result<Arc<LiveIndex>, Problem> {
     let live = state.jobs.live_index();
     state.require_index()?;
     if live.index.classes.is_empty() {
         return Err(index_empty());
     }
-    Ok((live, upload, left))
+    Ok(live)
 }
 
 async fn rank(

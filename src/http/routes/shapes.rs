@@ -9,14 +9,15 @@ use crate::http::dto::shape::{ShapeDto, UploadQuery, UploadResult};
 use crate::http::dto::{Binary, FilesForm, Page, PageQuery};
 use crate::http::extract::{ApiPath, ApiQuery};
 use crate::http::problem::{Code, Problem};
+use crate::http::problem_from::recovery_mode;
+use crate::http::request_memory::file_body;
 use crate::http::state::Parts;
 use crate::http::upload;
 use crate::http::uploaded::UploadedMesh;
-use crate::mesh::{Limits, PrepareOptions, ReadContext, prepare};
+use crate::mesh::{Limits, PrepareOptions, ReadContext, TriangleSoup, prepare_within};
 use crate::model::{Class, ClassName, NewShape, Shape, ShapeId, ShapePose};
 use crate::store::{AddedShape, StoreError};
 use axum::Json;
-use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -65,24 +66,23 @@ pub async fn create_shapes(
     let create = query.create.unwrap_or(false);
     check_poses(query.poses, &state.config.limits)?;
     let wanted = class.clone();
+    let asking = caller.clone();
     let options = state
         .blocking(move |s| {
-            match find_class(&s.store, &wanted) {
-                Err(problem) if create && problem.code == Code::ClassNotFound => {
-                    ClassName::new(&wanted)?;
-                }
-                found => drop(found?),
+            if s.store.recovery_mode().is_some() {
+                return Err(recovery_mode());
             }
+            let name = create.then(|| ClassName::new(&wanted)).transpose()?;
+            let more_classes = match (find_class(&s.store, &wanted), name) {
+                (Err(missing), Some(_)) if missing.code == Code::ClassNotFound => 1,
+                (found, _) => found.map(|_| 0)?,
+            };
+            // A caller that may add nothing at all is told so before its body is received.
+            s.limits.require_room(&s.store, &asking, more_classes)?;
             Ok(s.store.parameters()?.prepare_options())
         })
         .await?;
-    let upload = upload::receive(
-        request,
-        query.name,
-        state.config.upload_limits(),
-        state.config.upload_timeout,
-    )
-    .await?;
+    let upload = upload::receive(&state, request, query.name).await?;
     let shapes = check_all(&state, upload.meshes, query.poses, options).await?;
     let (class, added) = state
         .blocking(move |s| store(s, &caller, &class, create, shapes))
@@ -130,13 +130,11 @@ async fn check_all(
             } else {
                 Patience::Batch
             };
-            let shared = state.clone();
             state
                 .compute
                 .run(patience, state.config.query_timeout, move |work| {
-                    let reserved = shared.memory.reservation();
-                    reserved.grow(mesh.reading_bytes())?;
-                    check_one(&mesh, poses, &limits, &options, &work.cancel)
+                    let context = mesh.context(limits, &work.cancel);
+                    check_one(&mesh, poses, &context, &options)
                 })
         })
         .buffered(state.config.query_threads.max(1))
@@ -179,20 +177,13 @@ async fn check_all(
 fn check_one(
     mesh: &UploadedMesh,
     poses: Option<usize>,
-    limits: &Limits,
+    context: &ReadContext,
     options: &PrepareOptions,
-    cancel: &crate::cancel::Cancel,
 ) -> Result<Vec<NewShape>, Problem> {
-    let context = ReadContext {
-        cancel: cancel.clone(),
-        ..ReadContext::new(*limits)
-    };
     // Shared by all poses.
     let companions = mesh.companions();
-    let shape = |format, pose, soup| -> Result<NewShape, Problem> {
-        let stopped = |c: crate::cancel::Cancelled| Problem::new(Code::Cancelled, c.to_string());
-        cancel.check().map_err(stopped)?;
-        let (_, mut report) = prepare(soup, options)?;
+    let shape = |format, pose, soup: TriangleSoup| -> Result<NewShape, Problem> {
+        let (_, mut report) = prepare_within(soup, options, &context.cancel, &context.memory)?;
         report.warnings.splice(0..0, context.warnings.list());
         Ok(NewShape {
             name: Some(mesh.name.clone()),
@@ -204,10 +195,10 @@ fn check_one(
         })
     };
     let Some(wanted) = poses else {
-        let (format, soup) = mesh.read(&context)?;
+        let (format, soup) = mesh.read(context)?;
         return Ok(vec![shape(format, None, soup)?]);
     };
-    let (format, found) = mesh.read_poses(wanted, &context)?;
+    let (format, found) = mesh.read_poses(wanted, context)?;
     let of = found.len();
     found
         .into_iter()
@@ -367,8 +358,7 @@ pub async fn get_original(
         StatusCode::NOT_MODIFIED.into_response()
     } else {
         let file = tokio::fs::File::from_std(checked.file).take(checked.length);
-        let body = Body::from_stream(tokio_util::io::ReaderStream::with_capacity(file, 64 << 10));
-        let mut response = body.into_response();
+        let mut response = file_body(file, &state.memory)?.into_response();
         insert(&mut response, header::CONTENT_LENGTH, &checked.length.to_string());
         insert(&mut response, header::CONTENT_TYPE, shape.format.media_type());
         insert(&mut response, header::CONTENT_DISPOSITION, &disposition(&shape));

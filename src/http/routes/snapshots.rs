@@ -2,18 +2,19 @@
 
 use super::classes::insert;
 use crate::http::AppState;
+use crate::http::body::{body_too_large, broke_off, too_late};
 use crate::http::dto::snapshot::{RestoredDto, SnapshotDto};
 use crate::http::dto::{Binary, Page, PageQuery};
 use crate::http::extract::{ApiPath, ApiQuery, media_type};
 use crate::http::problem::{Code, Problem};
+use crate::http::request_memory::file_body;
 use crate::http::state::Parts;
-use crate::http::upload::body_too_large;
 use crate::jobs::JobError;
+use crate::memory::Reservation;
 use crate::model::{Restored, SnapshotId, SnapshotOrigin};
 use crate::store::StoreError;
 use crate::store::snapshot::Staged;
 use axum::Json;
-use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -22,9 +23,10 @@ use std::io::Seek;
 use std::sync::PoisonError;
 use std::time::Duration;
 use tokio::io::AsyncWriteExt;
+use tokio::time::Instant;
 
-/// How long the next piece of a snapshot may take to arrive.
-const PIECE_WITHIN: Duration = Duration::from_secs(30);
+/// Bytes of a snapshot that must arrive in a second, on average, once the time that any body may take is over.
+const SLOWEST: u64 = 1 << 20;
 
 /// Make a snapshot
 ///
@@ -126,8 +128,7 @@ pub async fn get_snapshot_file(
                 busy @ StoreError::OutOfDescriptors { .. } => Problem::from(busy),
                 _ => Problem::from(StoreError::NoSnapshot { id }).logged(e),
             })?;
-    let mut response =
-        Body::from_stream(tokio_util::io::ReaderStream::with_capacity(file, 256 << 10)).into_response();
+    let mut response = file_body(file, &state.memory)?.into_response();
     insert(&mut response, header::CONTENT_LENGTH, &found.bytes.to_string());
     insert(&mut response, header::CONTENT_TYPE, "application/zstd");
     insert(&mut response, header::ETAG, &format!("\"{}\"", found.hash));
@@ -152,7 +153,10 @@ pub async fn restore_snapshot(
     let id = parse(&snapshot)?;
     refuse_busy(&state)?;
     let restored = state
-        .blocking(move |s| take_over(s, s.store.stage_own_snapshot(id, s.config.snapshot_max_bytes)?))
+        .blocking(move |s| {
+            let _memory = reserve(s)?;
+            take_over(s, s.store.stage_own_snapshot(id, s.config.snapshot_max_bytes)?)
+        })
         .await?;
     Ok(Json(restored.into()))
 }
@@ -177,7 +181,10 @@ pub async fn restore_upload(
     let limit = state.config.snapshot_max_bytes;
     let archive = receive(&state, request, limit).await?;
     let restored = state
-        .blocking(move |s| take_over(s, s.store.stage_snapshot(archive, limit)?))
+        .blocking(move |s| {
+            let _memory = reserve(s)?;
+            take_over(s, s.store.stage_snapshot(archive, limit)?)
+        })
         .await?;
     Ok(Json(restored.into()))
 }
@@ -200,6 +207,16 @@ fn require_snapshot_type(headers: &HeaderMap) -> Result<(), Problem> {
         Code::UnsupportedMediaType,
         format!("{found} is not read here; send application/zstd"),
     ))
+}
+
+/// What unpacking a snapshot takes at most, in bytes: zstd looks back over up to 128 MiB, and records are read whole.
+const UNPACKING: u64 = 160 << 20;
+
+/// Memory for a restore, or all there is of it where that is less.
+fn reserve(parts: &Parts) -> Result<Reservation, Problem> {
+    let memory = parts.memory.reservation();
+    memory.grow(UNPACKING.min(parts.memory.limit()))?;
+    Ok(memory)
 }
 
 /// Switches with nobody else at the catalogue and no job in the way.
@@ -235,18 +252,15 @@ async fn receive(state: &AppState, request: Request, limit: u64) -> Result<std::
     let mut file = tokio::fs::File::from_std(file);
     let mut stream = request.into_body().into_data_stream();
     let mut received = 0_u64;
+    let began = Instant::now();
     loop {
-        let piece = tokio::time::timeout(PIECE_WITHIN, stream.next())
+        // A snapshot may be larger than what arrives within the time limit of other bodies, not slower.
+        let time = state.config.upload_timeout + Duration::from_secs(received / SLOWEST);
+        let piece = tokio::time::timeout_at(began + time, stream.next())
             .await
-            .map_err(|_| {
-                let seconds = PIECE_WITHIN.as_secs();
-                Problem::new(Code::RequestTimeout, format!("nothing arrived for {seconds} s"))
-                    .with("limit_seconds", seconds)
-            })?;
+            .map_err(|_| too_late(time))?;
         let Some(piece) = piece else { break };
-        let piece = piece.map_err(|e| {
-            Problem::new(Code::InvalidRequest, "the body broke off while it arrived").logged(e)
-        })?;
+        let piece = piece.map_err(broke_off)?;
         received += piece.len() as u64;
         if received > limit {
             return Err(too_long());
