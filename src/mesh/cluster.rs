@@ -10,8 +10,8 @@ use meshopt::simplify_sloppy_decoder;
 /// A mesh is first brought to this many times the size on a grid of our own, so that the library's calls are short.
 const COARSE: usize = 16;
 
-/// Faces that the library is given: one call takes some ten milliseconds.
-const MOST_FACES: usize = 130_000;
+/// Faces that the library is given: one call takes some tens of milliseconds.
+const MOST_FACES: usize = 600_000;
 
 /// Faces for each vertex of the size up to which that also holds for large sizes, whose surfaces have that many.
 const FACES_OF_SURFACE: usize = 64;

@@ -46,10 +46,15 @@ pub(super) fn weld_noise(
     }
     let within = (STEPS * step).min(OF_MEDIAN_EDGE * median_edge(vertices, faces, work)?);
     let _copies = (work.hold(vertices.len(), 24)?, work.hold(faces.len(), 12)?);
+    let mut copy = Vec::with_capacity(vertices.len());
+    for (i, p) in vertices.iter().enumerate() {
+        work.look(i)?;
+        copy.push(*p);
+    }
     let Welded {
         vertices: merged,
         index,
-    } = weld(vertices.clone(), within, work)?;
+    } = weld(copy, within, work)?;
     if merged.len() == vertices.len() {
         return Ok(None);
     }

@@ -57,8 +57,9 @@ pub(super) fn slivers(vertices: &[[f64; 3]], faces: &[[u32; 3]], work: Work) -> 
 ///
 /// Where a surface was closed it stays so, and where it was a manifold as well, if that is possible at all: modulo 2 the
 /// edges of one face stay the same. A sliver whose removal would fold a face with an area onto another stays, and so do
-/// all where more than half a million faces touch them, or where vertices of many faces would make it slow. The order of
-/// vertices and faces does not matter: slivers are taken by length and place.
+/// some where caps lie on the edges of many other caps, and all where more than half a million faces touch them, or where
+/// vertices of many faces would make it slow. The order of vertices and faces does not matter: slivers are taken by length
+/// and place.
 ///
 /// # Errors
 /// [`MeshError::Cancelled`], [`MeshError::Memory`].

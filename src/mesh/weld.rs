@@ -41,21 +41,20 @@ pub(super) fn weld(mut vertices: Vec<[f64; 3]>, within: f64, work: Work) -> Resu
     let _cells = work.hold(vertices.len(), 4)?;
     let suspects = suspects(&vertices, cell, work)?;
     let _suspects = work.hold(suspects.len(), 4 + 16)?;
-    let mut order: Vec<u128> = suspects
-        .iter()
-        .map(|&i| {
-            let key = cell(&vertices[i as usize])
-                .iter()
-                .fold(0, |key, c| key << BITS | u128::from(*c));
-            key << 32 | u128::from(i)
-        })
-        .collect();
+    let mut order: Vec<u128> = Vec::with_capacity(suspects.len());
+    for (n, &i) in suspects.iter().enumerate() {
+        work.look(n)?;
+        let key = cell(&vertices[i as usize])
+            .iter()
+            .fold(0, |key, c| key << BITS | u128::from(*c));
+        order.push(key << 32 | u128::from(i));
+    }
     sort(&mut order, &work)?;
 
     const ALONE: u32 = u32::MAX;
     let _joined = work.hold(order.len(), 4 + 4)?;
     let mut index = vec![ALONE; vertices.len()];
-    let cells = number_cells(order, &mut index);
+    let cells = number_cells(order, &mut index, work)?;
     let mut sets = DisjointSets::new(cells.len());
     join_touching(&cells, &mut sets, work)?;
 
@@ -86,9 +85,10 @@ pub(super) fn weld(mut vertices: Vec<[f64; 3]>, within: f64, work: Work) -> Resu
 }
 
 /// The cells that are not empty, ascending, and for each vertex of `order` the number of its cell.
-fn number_cells(mut order: Vec<u128>, cell_of: &mut [u32]) -> Vec<u128> {
+fn number_cells(mut order: Vec<u128>, cell_of: &mut [u32], work: Work) -> Result<Vec<u128>, MeshError> {
     let mut count = 0;
     for i in 0..order.len() {
+        work.look(i)?;
         let key = order[i];
         if count == 0 || order[count - 1] != key >> 32 {
             order[count] = key >> 32;
@@ -97,7 +97,7 @@ fn number_cells(mut order: Vec<u128>, cell_of: &mut [u32]) -> Vec<u128> {
         cell_of[(key & 0xffff_ffff) as usize] = (count - 1) as u32;
     }
     order.truncate(count);
-    order
+    Ok(order)
 }
 
 /// The vertices that may have another one in their cell or in a cell that touches it, ascending: those that share a

@@ -176,7 +176,7 @@ const INPUTS: [(&str, Make); 9] = [
     ("scrambled sphere", |n| {
         scrambled((f64::from(n) / 2.0).sqrt() as u32)
     }),
-    ("loose faces", |n| loose((f64::from(n) / 2.0).sqrt() as u32)),
+    ("loose faces", |n| loose((f64::from(n) / 6.0).sqrt() as u32)),
     ("points in a corner", |n| corner(n / 2)),
 ];
 
