@@ -100,8 +100,9 @@ fn finish(
     mut recovery: Vec<String>,
 ) -> Result<Store, StoreError> {
     let writer = settle(path, &*backend, &mut recovery)?;
+    // Who opens it warns of these; in an unpacked snapshot they are the rule.
     for line in &recovery {
-        tracing::warn!(line, "recovered");
+        tracing::info!(line, "recovered");
     }
     Ok(Store {
         inner: Arc::new(Inner {
