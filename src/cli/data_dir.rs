@@ -5,7 +5,7 @@
 
 use super::CliError;
 use crate::config::DEFAULT_DATA;
-use crate::store::StoreError;
+use crate::store::{Store, StoreError};
 use std::path::{Path, PathBuf};
 
 /// Files of which a data directory that was used has at least one.
@@ -70,6 +70,13 @@ pub fn say_made(path: &Path) {
 /// The same as a sentence.
 pub fn made(path: &Path) -> String {
     format!("made a new data directory: {}", path.display())
+}
+
+/// Says on stderr what was repaired as a data directory was opened.
+pub fn say_repaired(store: &Store) {
+    for line in store.recovery() {
+        eprintln!("shapelex: the data directory was repaired: {line}");
+    }
 }
 
 /// Why a data directory could not be opened, with the way to a service that runs on it.

@@ -51,6 +51,7 @@ fn from_store(data: &Path) -> Result<Exported, CliError> {
     let failed = |error: crate::store::StoreError| data_dir::open_error(&error);
     data_dir::require(data)?;
     let store = Store::open(data, &StoreOptions::default()).map_err(failed)?;
+    data_dir::say_repaired(&store);
     let generation = store
         .generation()
         .map_err(failed)?

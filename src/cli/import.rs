@@ -58,6 +58,7 @@ pub fn run(args: &ImportArgs, as_json: bool) -> Result<(), CliError> {
 
 fn into_store(args: &ImportArgs, exported: &Exported, names: Vec<ClassName>) -> Result<u64, StoreError> {
     let store = Store::open(&args.data, &StoreOptions::default())?;
+    data_dir::say_repaired(&store);
     let number = store.next_generation_number()?;
     let mut classes = Vec::new();
     for ((indexed, entry), name) in exported.index.classes.iter().zip(&exported.classes).zip(names) {

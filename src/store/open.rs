@@ -133,8 +133,9 @@ struct Parts<'a> {
 
 impl Parts<'_> {
     fn store(self) -> Store {
+        // The service warns of these; in an unpacked snapshot they are the rule.
         for line in &self.recovery {
-            tracing::warn!(line, "recovered");
+            tracing::info!(line, "recovered");
         }
         Store {
             inner: Arc::new(Inner {

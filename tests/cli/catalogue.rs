@@ -28,10 +28,11 @@ fn a_folder_and_standard_input_are_queried_and_summed_up() {
     let path = dir.path();
     small_zoo(path);
     answer(path, &[&["index", "shapes"], &FAST[..]].concat());
-    std::fs::write(path.join("shapes/broken.obj"), "v 0 0 0\n").unwrap();
-    let deep = path.join("shapes").join(&classes(path)[0]).join("more");
+    let names = classes(path);
+    let deep = path.join("shapes").join(&names[0]).join("more");
     std::fs::create_dir(&deep).unwrap();
-    std::fs::copy(first_file(path, &classes(path)[1]), deep.join("another.obj")).unwrap();
+    std::fs::copy(first_file(path, &names[1]), deep.join("another.obj")).unwrap();
+    std::fs::write(path.join("shapes/broken.obj"), "v 0 0 0\n").unwrap();
 
     let (stdout, told) = ended(path, 1, &["query", "shapes", "--json"]);
     let answers = lines(&stdout);
@@ -57,7 +58,7 @@ fn a_folder_and_standard_input_are_queried_and_summed_up() {
     assert!(stdout.contains("13 of 14 meshes answered, 1 refused"), "{stdout}");
     assert!(stdout.contains("class of the folder"), "{stdout}");
 
-    let file = first_file(path, &classes(path)[1]);
+    let file = first_file(path, &names[1]);
     let mut child = shapelex(path)
         .args(["query", "-", "--name", "from-a-pipe.obj", "--json"])
         .stdin(Stdio::piped())
@@ -78,7 +79,7 @@ fn a_folder_and_standard_input_are_queried_and_summed_up() {
         (ranked["file"].as_str(), ranked["name"].as_str()),
         (Some("-"), Some("from-a-pipe.obj"))
     );
-    assert_eq!(ranked["classes"][0]["class"]["name"], classes(path)[1].as_str());
+    assert_eq!(ranked["classes"][0]["class"]["name"], names[1].as_str());
 }
 
 #[test]
