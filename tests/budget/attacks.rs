@@ -80,15 +80,29 @@ impl Target {
                 } else {
                     meshes::off(meshes::CLASSES[1], pose)
                 };
-                let (status, answer) = self.post(&path, "model/off", &mesh);
-                assert!(status == 201 || status == 200, "{status} {answer}");
+                self.insist(|| {
+                    let (status, answer) = self.post(&path, "model/off", &mesh);
+                    (status == 201 || status == 200).then_some(()).ok_or(answer)
+                });
             }
         }
-        let job = self.reindex(&json!({"parameters": {
+        let small = json!({"parameters": {
             "eigenpairs": 50, "part_eigenpairs": 50, "energies": 40, "atoms": 12, "iterations": 5, "batch": 64,
             "samples_per_shape": 100
-        }}));
-        assert_eq!(job["state"], "succeeded", "{job}");
+        }});
+        self.insist(|| {
+            let job = self.reindex(&small);
+            (job["state"] == "succeeded").then_some(()).ok_or(job)
+        });
+    }
+
+    /// Tries until it is done, as a client does that is told to come back, for at most a minute.
+    fn insist(&self, attempt: impl Fn() -> Result<(), Value>) {
+        let began = Instant::now();
+        while let Err(answer) = attempt() {
+            assert!(began.elapsed() < Duration::from_secs(60), "{answer}");
+            std::thread::sleep(Duration::from_millis(300));
+        }
     }
 
     /// Reindexes and waits for the end.
@@ -114,15 +128,10 @@ impl Target {
 
     /// After all of it, a query is answered.
     pub fn answers_again(&self) {
-        let began = Instant::now();
-        loop {
+        self.insist(|| {
             let (status, answer) = self.post("/v1/query", "model/off", &meshes::off("bean", 5));
-            if status == 200 {
-                return;
-            }
-            assert!(began.elapsed() < Duration::from_secs(60), "{status} {answer}");
-            std::thread::sleep(Duration::from_millis(200));
-        }
+            (status == 200).then_some(()).ok_or(answer)
+        });
     }
 }
 
