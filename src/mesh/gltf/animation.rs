@@ -173,7 +173,7 @@ impl Tracks<'_> {
     ) -> Result<(), MeshError> {
         let time = self.first + moment * (self.last - self.first);
         for track in &self.tracks {
-            document.work.spend(track.curve.width + 40, 20, STEPS)?;
+            document.work.spend(track.curve.width + 12, 10, STEPS)?;
             let value = track.curve.at(time);
             let state = &mut state[track.node];
             match track.property {

@@ -58,7 +58,9 @@ impl<'s> Influences<'s> {
         influences.starts.push(0);
         for (at, k) in used.iter().enumerate() {
             if at % BLOCK == 0 {
-                document.work.spend(BLOCK * sets.len(), 30, STEPS)?;
+                document
+                    .work
+                    .spend(BLOCK.min(used.len() - at) * sets.len(), 30, STEPS)?;
             }
             for (joints, weights) in sets {
                 for i in 0..4 {
@@ -140,7 +142,9 @@ fn count(
     let mut count = 0;
     for (at, k) in used.iter().enumerate() {
         if at % BLOCK == 0 {
-            document.work.spend(BLOCK * sets.len(), 20, STEPS)?;
+            document
+                .work
+                .spend(BLOCK.min(used.len() - at) * sets.len(), 20, STEPS)?;
         }
         for (_, weights) in sets {
             count += (0..4).filter(|i| weights.number(k, *i) as f32 > 0.0).count();

@@ -121,7 +121,8 @@ impl<'s> Draft<'s> {
         let mut positions = Vec::with_capacity(used.len());
         for (at, k) in used.iter().enumerate() {
             if at % BLOCK == 0 {
-                document.work.spend(BLOCK, 10, "steps of reading its vertices")?;
+                let count = BLOCK.min(used.len() - at);
+                document.work.spend(count, 10, "steps of reading its vertices")?;
             }
             positions.push(self.positions.element(k));
         }
@@ -189,9 +190,11 @@ impl Part<'_> {
             }
             for (at, (k, point)) in self.used.iter().zip(&mut points).enumerate() {
                 if at % BLOCK == 0 {
-                    document
-                        .work
-                        .spend(BLOCK, 12, "steps of applying its morph targets to its vertices")?;
+                    document.work.spend(
+                        BLOCK.min(self.used.len() - at),
+                        12,
+                        "steps of applying its morph targets to its vertices",
+                    )?;
                 }
                 for (i, x) in point.iter_mut().enumerate() {
                     *x += weight * displacements.number(k, i);
