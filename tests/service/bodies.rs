@@ -11,9 +11,21 @@ use tokio::time::timeout;
 
 /// Opens a request with a body of so many bytes, none of which is sent.
 async fn open(address: SocketAddr, path: &str, media_type: &str, bytes: usize) -> TcpStream {
+    open_as("nobody", address, path, media_type, bytes).await
+}
+
+/// The same with a secret: the local token is for what only the data directory's owner may do.
+async fn open_as(
+    secret: &str,
+    address: SocketAddr,
+    path: &str,
+    media_type: &str,
+    bytes: usize,
+) -> TcpStream {
     let mut stream = TcpStream::connect(address).await.unwrap();
     let head = format!(
-        "POST {path} HTTP/1.1\r\nhost: localhost\r\ncontent-type: {media_type}\r\ncontent-length: {bytes}\r\n\r\n"
+        "POST {path} HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer {secret}\r\n\
+         content-type: {media_type}\r\ncontent-length: {bytes}\r\n\r\n"
     );
     stream.write_all(head.as_bytes()).await.unwrap();
     stream
@@ -295,7 +307,8 @@ async fn every_body_has_a_time_limit_however_it_dribbles() {
         ("/v1/snapshots/restore", "application/zstd"),
     ] {
         let began = Instant::now();
-        let stream = open(running.address, path, media_type, 1000).await;
+        let secret = running.state.local_token.secret();
+        let stream = open_as(&secret, running.address, path, media_type, 1000).await;
         let (mut reader, mut writer) = stream.into_split();
         let dribble = tokio::spawn(async move {
             for _ in 0..100 {

@@ -72,10 +72,12 @@ pub async fn create_shapes(
             if s.store.recovery_mode().is_some() {
                 return Err(recovery_mode());
             }
-            let name = create.then(|| ClassName::new(&wanted)).transpose()?;
-            let more_classes = match (find_class(&s.store, &wanted), name) {
-                (Err(missing), Some(_)) if missing.code == Code::ClassNotFound => 1,
-                (found, _) => found.map(|_| 0)?,
+            let more_classes = match find_class(&s.store, &wanted) {
+                Err(missing) if create && missing.code == Code::ClassNotFound => {
+                    ClassName::new(&wanted)?;
+                    1
+                }
+                found => found.map(|_| 0)?,
             };
             // A caller that may add nothing at all is told so before its body is received.
             s.limits.require_room(&s.store, &asking, more_classes)?;
