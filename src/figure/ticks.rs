@@ -23,14 +23,11 @@ pub(super) enum Quantity {
 /// About as many ticks as are aimed at, at multiples of 1, 2 or 5 times a power of ten within the range; more where
 /// there would be only one.
 pub(super) fn linear(range: (f64, f64), aim: usize, quantity: Quantity) -> Vec<Tick> {
-    let tries = aim.max(1)..=aim + 6;
-    let found = tries.map(|aim| divided(range, aim, quantity));
-    let enough = |ticks: &Vec<Tick>| ticks.len() >= 2;
-    found
-        .clone()
-        .find(enough)
-        .or_else(|| found.last())
-        .unwrap_or_default()
+    let most = aim + 6;
+    (aim.max(1)..=most)
+        .map(|aim| divided(range, aim, quantity))
+        .find(|ticks| ticks.len() >= 2)
+        .unwrap_or_else(|| divided(range, most, quantity))
 }
 
 fn divided((low, high): (f64, f64), aim: usize, quantity: Quantity) -> Vec<Tick> {

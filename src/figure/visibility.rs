@@ -68,6 +68,10 @@ fn with_front(
         .collect()
 }
 
+/// Pixels around a point that have to be covered too before it counts as hidden: at an outline a pixel may be taken by a
+/// triangle that covers only a part of it.
+const AROUND: usize = 2;
+
 /// How near to the viewer the nearest triangle is at every pixel; minus infinity where there is none.
 struct Depth {
     values: Vec<f64>,
@@ -83,11 +87,11 @@ impl Depth {
     fn hides(&self, p: &Vector) -> bool {
         let around = |at: f64, from: f64, cells: usize| {
             let cell = (((at - from) * self.resolution).max(0.0) as usize).min(cells - 1);
-            cell.saturating_sub(1)..=(cell + 1).min(cells - 1)
+            cell.saturating_sub(AROUND)..=(cell + AROUND).min(cells - 1)
         };
         let columns = around(p[0], self.left, self.columns);
         // A surface that is level with the pixel's centre is not in front of itself.
-        let nearer = p[2] + 1.0 / self.resolution;
+        let nearer = p[2] + AROUND as f64 / self.resolution;
         around(p[1], self.low, self.rows).all(|y| {
             columns
                 .clone()
