@@ -15,13 +15,7 @@ async fn open(address: SocketAddr, path: &str, media_type: &str, bytes: usize) -
 }
 
 /// The same with a secret: the local token is for what only the data directory's owner may do.
-async fn open_as(
-    secret: &str,
-    address: SocketAddr,
-    path: &str,
-    media_type: &str,
-    bytes: usize,
-) -> TcpStream {
+async fn open_as(secret: &str, address: SocketAddr, path: &str, media_type: &str, bytes: usize) -> TcpStream {
     let mut stream = TcpStream::connect(address).await.unwrap();
     let head = format!(
         "POST {path} HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer {secret}\r\n\
