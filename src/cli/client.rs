@@ -27,7 +27,24 @@ const CLOSE_WITHIN: Duration = Duration::from_secs(30);
 /// Where a command works.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct TargetArgs {
-    /// Data directory to work in; `keys` and `snapshot` ask the service that runs on it [default: shapelex-data]
+    /// Data directory to work in, when no service runs on it [default: shapelex-data]
+    #[arg(long, env = "SHAPELEX_DATA", value_name = "DIR", conflicts_with = "server")]
+    pub data: Option<PathBuf>,
+    /// Running service to work with, such as http://127.0.0.1:7345 or https://shapes.example
+    #[arg(long, env = "SHAPELEX_SERVER", value_name = "URL")]
+    pub server: Option<String>,
+    /// API key for a running service that asks for one; the environment keeps it out of the process list
+    #[arg(long, env = "SHAPELEX_API_KEY", value_name = "KEY", hide_env_values = true)]
+    pub api_key: Option<String>,
+    /// Certificates (PEM) to trust a https:// service by, instead of the well-known ones
+    #[arg(long, env = "SHAPELEX_CA_CERT", value_name = "FILE")]
+    pub ca_cert: Option<PathBuf>,
+}
+
+/// Where a command works that only an operator may give.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct OperatorArgs {
+    /// Data directory to work in, or of the service to work with: its token is there [default: shapelex-data]
     #[arg(long, env = "SHAPELEX_DATA", value_name = "DIR")]
     pub data: Option<PathBuf>,
     /// Running service to work with, such as http://127.0.0.1:7345 or https://shapes.example
@@ -70,24 +87,26 @@ impl TargetArgs {
         }
         Ok(client)
     }
+}
 
-    /// As [`client`](Self::client), for what only an operator may do. On a data directory that a service runs on it is
-    /// that service's client. Without an API key it brings the token that the service keeps in its data directory.
+impl OperatorArgs {
+    /// As [`TargetArgs::client`]. On a data directory that a service runs on it is that service's client. Without an API
+    /// key it brings the token that the service keeps in its data directory.
     ///
     /// # Errors
-    /// As [`client`](Self::client).
-    pub fn operator_client(&self) -> Result<Client, CliError> {
+    /// As [`TargetArgs::client`].
+    pub fn client(&self) -> Result<Client, CliError> {
         if self.server.is_none() {
             data_dir::require(&data_dir::chosen(self.data.as_deref()))?;
         }
-        self.operator_client_or_new()
+        self.client_or_new()
     }
 
     /// The same; a data directory that is not there is made, and said to be.
     ///
     /// # Errors
-    /// As [`client_or_new`](Self::client_or_new).
-    pub fn operator_client_or_new(&self) -> Result<Client, CliError> {
+    /// As [`TargetArgs::client_or_new`].
+    pub fn client_or_new(&self) -> Result<Client, CliError> {
         let data = data_dir::chosen(self.data.as_deref());
         let access = || LocalAccess::read(&data);
         let remote = |url: &str, token: Option<String>| {

@@ -1,6 +1,6 @@
 //! `shapelex keys`: who may use a service.
 
-use super::client::{Client, Payload, TargetArgs};
+use super::client::{Client, OperatorArgs, Payload};
 use super::encode::encode;
 use super::{CliError, listing, output};
 use crate::model::KeyName;
@@ -21,7 +21,7 @@ pub enum KeysCommand {
     /// Make a key and print its secret, once
     Create(CreateArgs),
     /// List the keys, without their secrets
-    List(TargetArgs),
+    List(OperatorArgs),
     /// Make a key useless, at once and for good
     Revoke(RevokeArgs),
 }
@@ -49,7 +49,7 @@ pub struct CreateArgs {
     pub max_classes: Option<u64>,
     /// Where the keys are kept.
     #[command(flatten)]
-    pub target: TargetArgs,
+    pub target: OperatorArgs,
 }
 
 /// Arguments of `keys revoke`.
@@ -60,7 +60,7 @@ pub struct RevokeArgs {
     pub key: String,
     /// Where the keys are kept.
     #[command(flatten)]
-    pub target: TargetArgs,
+    pub target: OperatorArgs,
 }
 
 /// Runs the subcommand, on a data directory or a running service.
@@ -70,7 +70,7 @@ pub struct RevokeArgs {
 pub fn run(args: &KeysArgs, json: bool) -> Result<(), CliError> {
     match &args.command {
         KeysCommand::Create(args) => create(args, json),
-        KeysCommand::List(target) => list(&target.operator_client()?, json),
+        KeysCommand::List(target) => list(&target.client()?, json),
         KeysCommand::Revoke(args) => revoke(args, json),
     }
 }
@@ -101,10 +101,10 @@ fn create(args: &CreateArgs, json: bool) -> Result<(), CliError> {
         }
     }
     KeyName::new(&args.name).map_err(|error| CliError::Usage(format!("{}: {error}", args.name)))?;
-    let made =
-        args.target
-            .operator_client_or_new()?
-            .call("POST", "/v1/keys", Payload::Json(Value::Object(body)))?;
+    let made = args
+        .target
+        .client_or_new()?
+        .call("POST", "/v1/keys", Payload::Json(Value::Object(body)))?;
     if json {
         return output::json(&made);
     }
@@ -142,9 +142,7 @@ fn row(key: &Value) -> Vec<String> {
 
 fn revoke(args: &RevokeArgs, json: bool) -> Result<(), CliError> {
     let path = format!("/v1/keys/{}", encode(&args.key));
-    args.target
-        .operator_client()?
-        .call("DELETE", &path, Payload::Empty)?;
+    args.target.client()?.call("DELETE", &path, Payload::Empty)?;
     if json {
         output::json(&json!({ "revoked": args.key }))
     } else {

@@ -208,7 +208,6 @@ fn rank_against(
         "probability": judged.verdict.probability,
         "none_of_these": judged.none_of_these,
         "margin": ranking.confidence,
-        "confidence": ranking.confidence,
         "compared": ranking.compared,
         "pruned": ranking.pruned,
         "signatures": ranking.signatures,

@@ -1,7 +1,7 @@
 //! `shapelex snapshot`: everything a service holds, as one file, and back.
 
 use super::CliError;
-use super::client::{Payload, TargetArgs};
+use super::client::{OperatorArgs, Payload};
 use super::encode::encode;
 use super::listing::{self, Column, tell};
 use crate::model::SnapshotId;
@@ -28,13 +28,13 @@ pub enum SnapshotCommand {
         out: Option<PathBuf>,
         /// Where the data is.
         #[command(flatten)]
-        target: TargetArgs,
+        target: OperatorArgs,
     },
     /// List the snapshots there are
     List {
         /// Where the data is.
         #[command(flatten)]
-        target: TargetArgs,
+        target: OperatorArgs,
     },
     /// Save a snapshot to a file
     Download {
@@ -45,7 +45,7 @@ pub enum SnapshotCommand {
         out: PathBuf,
         /// Where the data is.
         #[command(flatten)]
-        target: TargetArgs,
+        target: OperatorArgs,
     },
     /// Replace everything there is by what a snapshot holds
     Restore {
@@ -54,7 +54,7 @@ pub enum SnapshotCommand {
         snapshot: String,
         /// Where the data goes; a data directory is made where there is none.
         #[command(flatten)]
-        target: TargetArgs,
+        target: OperatorArgs,
     },
     /// Delete a snapshot
     Delete {
@@ -62,7 +62,7 @@ pub enum SnapshotCommand {
         id: String,
         /// Where the data is.
         #[command(flatten)]
-        target: TargetArgs,
+        target: OperatorArgs,
     },
 }
 
@@ -73,7 +73,7 @@ pub enum SnapshotCommand {
 pub fn run(args: &SnapshotArgs, as_json: bool) -> Result<(), CliError> {
     match &args.command {
         SnapshotCommand::Create { out, target } => {
-            let client = target.operator_client()?;
+            let client = target.client()?;
             let made = client.call("POST", "/v1/snapshots", Payload::Empty)?;
             if let Some(out) = out {
                 client.download(text(&made, "file"), out)?;
@@ -84,11 +84,11 @@ pub fn run(args: &SnapshotArgs, as_json: bool) -> Result<(), CliError> {
             })
         }
         SnapshotCommand::List { target } => {
-            let snapshots = listing::all(&target.operator_client()?, "/v1/snapshots")?;
+            let snapshots = listing::all(&target.client()?, "/v1/snapshots")?;
             listing::print(&snapshots, &COLUMNS, "no snapshots", as_json)
         }
         SnapshotCommand::Download { id, out, target } => {
-            let client = target.operator_client()?;
+            let client = target.client()?;
             let path = format!("/v1/snapshots/{}/file", encode(id));
             let bytes = client.download(&path, out)?;
             let told = json!({"file": out.display().to_string(), "bytes": bytes});
@@ -97,7 +97,7 @@ pub fn run(args: &SnapshotArgs, as_json: bool) -> Result<(), CliError> {
         SnapshotCommand::Restore { snapshot, target } => restore(snapshot, target, as_json),
         SnapshotCommand::Delete { id, target } => {
             let path = format!("/v1/snapshots/{}", encode(id));
-            target.operator_client()?.call("DELETE", &path, Payload::Empty)?;
+            target.client()?.call("DELETE", &path, Payload::Empty)?;
             tell(as_json, &json!({ "deleted": id }), || format!("deleted {id}"))
         }
     }
@@ -130,11 +130,11 @@ fn require_zstd(file: &Path) -> Result<(), CliError> {
 }
 
 /// Restores from a file, or from a snapshot that is there. What is neither is found out before a directory is made.
-fn restore(snapshot: &str, target: &TargetArgs, as_json: bool) -> Result<(), CliError> {
+fn restore(snapshot: &str, target: &OperatorArgs, as_json: bool) -> Result<(), CliError> {
     let file = PathBuf::from(snapshot);
     let restored = if file.is_file() {
         require_zstd(&file)?;
-        let client = target.operator_client_or_new()?;
+        let client = target.client_or_new()?;
         client.send_file("/v1/snapshots/restore", "application/zstd", &file)?
     } else {
         if snapshot.parse::<SnapshotId>().is_err() {
@@ -148,7 +148,7 @@ fn restore(snapshot: &str, target: &TargetArgs, as_json: bool) -> Result<(), Cli
             )));
         }
         let path = format!("/v1/snapshots/{}/restore", encode(snapshot));
-        target.operator_client()?.call("POST", &path, Payload::Empty)?
+        target.client()?.call("POST", &path, Payload::Empty)?
     };
     tell(as_json, &restored, || {
         format!(

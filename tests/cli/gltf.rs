@@ -65,7 +65,7 @@ fn a_missing_buffer_says_where_it_belongs() {
     assert_eq!(output.status.code(), Some(1), "{message}");
     assert_eq!(message.lines().count(), 1, "{message}");
     assert!(
-        message.contains("'plain.bin'") && message.contains("put it beside the file"),
+        message.contains("'plain.bin'") && message.contains("put it there"),
         "{message}"
     );
 }
@@ -105,7 +105,7 @@ fn instances_are_warned_of() {
     );
     assert_ne!(instanced, text);
     std::fs::write(dir.path().join("instanced.gltf"), instanced).unwrap();
-    let shown = answer(dir.path(), &["inspect", "instanced.gltf"]);
+    let shown = stderr(&run(dir.path(), &["inspect", "instanced.gltf"]));
     assert!(
         shown.contains("warning") && shown.contains("one copy of each was read"),
         "{shown}"

@@ -64,6 +64,7 @@ fn the_owner_makes_the_first_key_while_the_service_runs() {
 fn a_restore_into_a_running_service_takes_its_directory_or_a_key() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path();
+    assert!(Service::start(path, &["--data", "a"]).terminate().success());
     answer(
         path,
         &["snapshot", "create", "--data", "a", "--out", "all.tar.zst"],
@@ -406,7 +407,7 @@ mod linux {
             .args([
                 "-c",
                 &format!(
-                    "umask 000; {} snapshot create --data e",
+                    "umask 000; {} keys create admin --scope admin --data e",
                     env!("CARGO_BIN_EXE_shapelex")
                 ),
             ])

@@ -8,6 +8,8 @@ use std::time::Duration;
 pub struct Client {
     agent: ureq::Agent,
     base: String,
+    /// The local token, for what only the data directory's owner may do.
+    token: Option<String>,
 }
 
 /// An answer that arrived whole.
@@ -42,6 +44,17 @@ impl Client {
         Self {
             agent,
             base: base.to_owned(),
+            token: None,
+        }
+    }
+
+    /// The client of the owner of the service's data directory.
+    pub fn of_owner(base: &str, data: &std::path::Path) -> Self {
+        let access = std::fs::read(data.join("local-access.json")).unwrap();
+        let access: Value = serde_json::from_slice(&access).unwrap();
+        Self {
+            token: Some(access["token"].as_str().unwrap().to_owned()),
+            ..Self::new(base)
         }
     }
 
@@ -51,6 +64,10 @@ impl Client {
             .method(method)
             .uri(format!("{}{path}", self.base))
             .header("content-type", media_type)
+            .header(
+                "authorization",
+                format!("Bearer {}", self.token.as_deref().unwrap_or("none")),
+            )
             .body(body)
             .unwrap();
         let mut response = self.agent.run(request).ok()?;

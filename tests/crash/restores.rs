@@ -20,7 +20,7 @@ fn a_restore_killed_anywhere_is_the_old_or_the_new() {
     let worker = |seed| Worker::new(1, ChaCha8Rng::seed_from_u64(seed));
 
     let service = Service::start(path, &[]);
-    let client = Client::new(&service.url);
+    let client = Client::of_owner(&service.url, &path.join("data"));
     let mut snapshotted = worker(seed);
     for _ in 0..12 {
         let change = snapshotted.choose();
@@ -36,7 +36,7 @@ fn a_restore_killed_anywhere_is_the_old_or_the_new() {
     let (mut old, mut new, mut starting) = (0, 0, 0);
     for round in 0..kills {
         let service = Service::start(path, &[]);
-        let client = Client::new(&service.url);
+        let client = Client::of_owner(&service.url, &path.join("data"));
         let name = format!("{}round {round}", current.prefix);
         assert!(current.ask(
             &client,
@@ -60,7 +60,7 @@ fn a_restore_killed_anywhere_is_the_old_or_the_new() {
             starting += 1;
         }
         let service = Service::start(path, &[]);
-        let client = Client::new(&service.url);
+        let client = Client::of_owner(&service.url, &path.join("data"));
         let found = crate::model::read(&client, &current.prefix);
         if crate::model::agrees(&found, &current.known) {
             old += 1;
@@ -79,7 +79,7 @@ fn a_restore_killed_anywhere_is_the_old_or_the_new() {
         }
     }
     let service = Service::start(path, &[]);
-    let client = Client::new(&service.url);
+    let client = Client::of_owner(&service.url, &path.join("data"));
     let answer = client.json("POST", &restore, &json!({})).unwrap();
     assert_eq!(answer.status, 200, "{}", answer.text());
     snapshotted.check(&client);

@@ -240,7 +240,7 @@ fn a_needle_is_closed() {
     assert_closed(&mesh, &report, 2);
     assert_eq!(
         (report.repaired_faces, report.vertices, report.faces),
-        (1, 162, 320)
+        (2, 162, 320)
     );
 }
 
