@@ -33,7 +33,7 @@ const LEFT: f64 = 0.5;
 /// [`MeshError::Cancelled`], [`MeshError::Memory`].
 pub(super) fn weld_noise(
     vertices: &mut Vec<[f64; 3]>,
-    faces: &mut Vec<[u32; 3]>,
+    faces: &mut [[u32; 3]],
     step: f64,
     work: Work,
 ) -> Result<Option<f64>, MeshError> {

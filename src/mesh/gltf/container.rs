@@ -86,17 +86,30 @@ fn replaced(bytes: &[u8]) -> String {
     text
 }
 
-/// A chunk's type and contents, and where the next one begins; `None` where there is none.
-fn chunk(bytes: &[u8], at: usize) -> Option<(&[u8], Result<&[u8], usize>, usize)> {
+/// A chunk of a GLB.
+struct Chunk<'a> {
+    kind: &'a [u8],
+    /// Its contents, or the length that it promises where the file ends before.
+    contents: Result<&'a [u8], usize>,
+    /// Where the next one begins.
+    next: usize,
+}
+
+/// The chunk that begins at `at`; `None` where there is none.
+fn chunk(bytes: &[u8], at: usize) -> Option<Chunk<'_>> {
     let head = bytes.get(at..at.checked_add(CHUNK_HEADER)?)?;
     let length = u32::from_le_bytes([head[0], head[1], head[2], head[3]]) as usize;
     let start = at + CHUNK_HEADER;
-    let end = start.saturating_add(length);
-    Some((&head[4..], bytes.get(start..end).ok_or(length), end))
+    let next = start.saturating_add(length);
+    Some(Chunk {
+        kind: &head[4..],
+        contents: bytes.get(start..next).ok_or(length),
+        next,
+    })
 }
 
 fn known(bytes: &[u8], at: usize) -> bool {
-    chunk(bytes, at).is_some_and(|(kind, ..)| kind == JSON || kind == BINARY)
+    chunk(bytes, at).is_some_and(|chunk| chunk.kind == JSON || chunk.kind == BINARY)
 }
 
 /// The length that a GLB's header promises, at most that of the file.
@@ -138,7 +151,12 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), MeshError> {
     let length = promised_length(bytes)?;
     let (mut json, mut binary) = (None, None);
     let mut at = HEADER;
-    while let Some((kind, contents, mut next)) = chunk(bytes, at) {
+    while let Some(Chunk {
+        kind,
+        contents,
+        mut next,
+    }) = chunk(bytes, at)
+    {
         let contents = match contents {
             Ok(contents) => contents,
             // What follows the promised length need not be a chunk.
