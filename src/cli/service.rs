@@ -24,6 +24,8 @@ pub fn run_until(
         .max_blocking_threads(BLOCKING_THREADS)
         .build()?;
     let outcome = runtime.block_on(async {
+        // Waited for from the start: a signal that comes right after the address is told must not end the process unasked.
+        let shutdown = tokio::spawn(shutdown);
         let address = config.listen;
         // The address first: opening a large data directory takes a while, a taken port should say so at once.
         let listener = TcpListener::bind(address)
@@ -39,7 +41,11 @@ pub fn run_until(
         let address = listener.local_addr()?;
         announce(&state, address);
         listening(address)?;
-        serve(state, listener, shutdown)
+        let stopped = async move {
+            // It does not panic, and is not cancelled before the runtime ends.
+            let _ = shutdown.await;
+        };
+        serve(state, listener, stopped)
             .await
             .map_err(|error| CliError::Failed(error.to_string()))
     });

@@ -302,7 +302,7 @@ async fn every_body_has_a_time_limit_however_it_dribbles() {
     ] {
         let began = Instant::now();
         let secret = running.state.local_token.secret();
-        let stream = open_as(&secret, running.address, path, media_type, 1000).await;
+        let stream = open_as(secret, running.address, path, media_type, 1000).await;
         let (mut reader, mut writer) = stream.into_split();
         let dribble = tokio::spawn(async move {
             for _ in 0..100 {
