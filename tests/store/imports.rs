@@ -69,7 +69,7 @@ fn imported_classes_stay_until_they_get_shapes_or_are_deleted() {
         let report = done(&jobs, reindex(scope, None)).result.unwrap();
         assert_eq!(report.reused, [imported]);
         assert!(report.skipped.is_empty(), "{:?}", report.skipped);
-        assert_eq!(indexed(&jobs), [kept.clone()]);
+        assert_eq!(indexed(&jobs), std::slice::from_ref(&kept));
     }
     let own = class_of(&store, "own", 1.0, 0..3);
     let report = done(&jobs, reindex(ReindexScope::Stale, None)).result.unwrap();
