@@ -209,7 +209,8 @@ fn problems_of(operation: &str) -> Vec<Code> {
         "get_page" | "get_docs" | "get_openapi_yaml" | "get_openapi_json" | "get_liveness"
         | "get_metrics" => vec![],
         "get_readiness" => vec![NotReady],
-        "get_index" | "get_parameters" => vec![],
+        "get_index" => vec![InvalidQuery, InvalidCursor],
+        "get_parameters" => vec![],
         "list_classes" => vec![InvalidQuery, InvalidCursor],
         "create_class" => [JSON, WRITE, &[InvalidName, ClassExists, QuotaExceeded]].concat(),
         "get_class" => vec![InvalidRequest, ClassNotFound],
