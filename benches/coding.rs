@@ -4,8 +4,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use faer::Mat;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use shapelex::cancel::Cancel;
-use shapelex::coding::{Dictionary, LearnParameters, Signals, encode, learn, score_signals};
+use shapelex_core::cancel::Cancel;
+use shapelex_core::coding::{Dictionary, LearnParameters, Signals, encode, learn, score_signals};
 use std::hint::black_box;
 
 /// Bumps that move and swell smoothly from signal to signal, as signatures do along a mesh; unit norm times `norm`.

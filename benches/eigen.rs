@@ -3,9 +3,9 @@
 //! `cargo bench --bench eigen`. Meshes are geodesic spheres, deformed so that no symmetry is left, in shuffled order.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use shapelex::cancel::Cancel;
-use shapelex::mesh::TriMesh;
-use shapelex::spectral::{EigenOptions, assemble, smallest_eigenpairs};
+use shapelex_core::cancel::Cancel;
+use shapelex_core::mesh::TriMesh;
+use shapelex_core::spectral::{EigenOptions, assemble, smallest_eigenpairs};
 use std::collections::HashMap;
 use std::hint::black_box;
 

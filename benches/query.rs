@@ -4,14 +4,14 @@
 //! first, some 2000 vertices as an OBJ file, is the query.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use shapelex::cancel::Cancel;
-use shapelex::mesh::{Limits, Source, TriMesh, prepare, read};
-use shapelex::parameters::{Parameters, Preset};
-use shapelex::pipeline::{Description, describe_query, describe_shape, learn_model};
-use shapelex::ranking::{Index, IndexedClass, rank};
-use shapelex::sample::{Species, ZooOptions, species, write_obj};
-use shapelex::signature::describe_vertices;
-use shapelex::spectral::{EigenOptions, assemble, smallest_eigenpairs};
+use shapelex_core::cancel::Cancel;
+use shapelex_core::mesh::{Limits, Source, TriMesh, prepare, read};
+use shapelex_core::parameters::{Parameters, Preset};
+use shapelex_core::pipeline::{Description, describe_query, describe_shape, learn_model};
+use shapelex_core::ranking::{Index, IndexedClass, rank};
+use shapelex_core::signature::describe_vertices;
+use shapelex_core::spectral::{EigenOptions, assemble, smallest_eigenpairs};
+use shapelex_eval::sample::{Species, ZooOptions, species, write_obj};
 use std::error::Error;
 use std::hint::black_box;
 

@@ -5,13 +5,13 @@
 //! `docs/configuration.md` is checked against it by a test.
 
 use crate::http::ServiceConfig;
-use crate::mesh::Limits;
 use crate::model::KeyLimits;
-use crate::parameters::Preset;
 use crate::store::StoreOptions;
 use crate::telemetry::LogFormat;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::{Deserialize, Serialize};
+use shapelex_core::mesh::Limits;
+use shapelex_core::parameters::Preset;
 use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::time::Duration;

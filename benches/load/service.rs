@@ -1,7 +1,7 @@
 //! The service under load: the real binary in a process of its own.
 
 use serde_json::{Value, json};
-use shapelex::sample::{ZooOptions, creatures, species, write_obj};
+use shapelex_eval::sample::{ZooOptions, creatures, species, write_obj};
 use std::net::TcpListener;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -2,7 +2,7 @@
 
 use super::Outcome;
 use serde_json::Value;
-use shapelex::figure::{CostAxes, Series, cost_curves};
+use shapelex_eval::figure::{CostAxes, Series, cost_curves};
 use std::fs;
 use std::path::Path;
 

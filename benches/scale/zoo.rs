@@ -9,13 +9,13 @@ use faer::{Mat, MatRef};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use shapelex::cancel::Cancel;
-use shapelex::coding::Dictionary;
-use shapelex::parameters::{Channel, Hypothesis, Parameters};
-use shapelex::pipeline::{Description, describe_query, describe_shape, learn_model};
-use shapelex::ranking::{Index, IndexedClass, View};
-use shapelex::sample::{Species, ZooOptions};
-use shapelex::signature::Signatures;
+use shapelex_core::cancel::Cancel;
+use shapelex_core::coding::Dictionary;
+use shapelex_core::parameters::{Channel, Hypothesis, Parameters};
+use shapelex_core::pipeline::{Description, describe_query, describe_shape, learn_model};
+use shapelex_core::ranking::{Index, IndexedClass, View};
+use shapelex_core::signature::Signatures;
+use shapelex_eval::sample::{Species, ZooOptions};
 use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -161,7 +161,7 @@ pub fn describe(
     number: usize,
     pose: usize,
     options: &ZooOptions,
-    how: impl Fn(shapelex::mesh::TriangleSoup) -> Result<Description, shapelex::pipeline::PipelineError>,
+    how: impl Fn(shapelex_core::mesh::TriangleSoup) -> Result<Description, shapelex_core::pipeline::PipelineError>,
 ) -> Result<Description, String> {
     let named = Species::named();
     let species = match named.get(number) {

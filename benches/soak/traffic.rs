@@ -2,7 +2,7 @@
 
 use crate::process::Process;
 use serde_json::{Value, json};
-use shapelex::sample::{ZooOptions, creatures, species, write_glb, write_obj};
+use shapelex_eval::sample::{ZooOptions, creatures, species, write_glb, write_obj};
 use std::io::{Cursor, Read, Write};
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};

@@ -1,6 +1,6 @@
 //! Bytes → mesh → prepared mesh, as one format or as whatever they look like.
 
-use shapelex::mesh::{
+use shapelex_core::mesh::{
     Components, Format, Limits, PrepareOptions, Source, TriMesh, TriangleSoup, prepare, read, read_poses,
 };
 

@@ -1,6 +1,6 @@
 //! Polygons → triangles, through a binary PLY of one face.
 
-use shapelex::mesh::{Limits, Source, read};
+use shapelex_core::mesh::{Limits, Source, read};
 use std::collections::HashMap;
 
 const LIMITS: Limits = Limits {

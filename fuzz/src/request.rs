@@ -10,7 +10,7 @@ use shapelex::http::dto::query::QueryOptions;
 use shapelex::http::dto::shape::UploadQuery;
 use shapelex::http::extract::{ApiJson, ApiQuery, OptionalJson};
 use shapelex::model::{ClassId, ClassName};
-use shapelex::parameters::Parameters;
+use shapelex_core::parameters::Parameters;
 use tokio::runtime::{Builder, Runtime};
 
 thread_local! {

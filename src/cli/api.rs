@@ -114,7 +114,7 @@ fn mesh_payload(file: MeshFile) -> Payload {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::Companion;
+    use shapelex_core::mesh::Companion;
 
     #[test]
     fn buffers_travel_beside_their_file() {

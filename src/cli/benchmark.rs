@@ -6,16 +6,16 @@ use super::benchmark_nulls::{self, Null};
 use super::peak_memory::{peak_bytes, reset_peak};
 use super::progress::Progress;
 use super::{CliError, benchmark_report, figures, output};
-use crate::benchmark::evaluate::Models;
-use crate::benchmark::report::{BenchmarkReport, Cost, NullInfo};
-use crate::benchmark::{
+use rayon::prelude::*;
+use shapelex_core::cancel::Cancel;
+use shapelex_core::mesh::TriangleSoup;
+use shapelex_core::parameters::Parameters;
+use shapelex_eval::benchmark::evaluate::Models;
+use shapelex_eval::benchmark::report::{BenchmarkReport, Cost, NullInfo};
+use shapelex_eval::benchmark::{
     Category, Member, Method, Outcome, Robustness, Setting, Shapes, Specimen, null_models, run_unit,
 };
-use crate::cancel::Cancel;
-use crate::figure::{benchmark_figures, deformation_gallery};
-use crate::mesh::TriangleSoup;
-use crate::parameters::Parameters;
-use rayon::prelude::*;
+use shapelex_eval::figure::{benchmark_figures, deformation_gallery};
 use std::collections::HashMap;
 use std::path::Path;
 use std::time::Instant;

@@ -2,8 +2,8 @@
 
 use super::benchmark_nulls::Null;
 use super::{CliError, ParameterArgs};
-use crate::benchmark::{Category, Method, Robustness, Setting};
-use crate::parameters::Preset;
+use shapelex_core::parameters::Preset;
+use shapelex_eval::benchmark::{Category, Method, Robustness, Setting};
 use std::path::PathBuf;
 
 /// Eigenpairs where only Shape DNA is asked for.

@@ -5,9 +5,9 @@
 //! computed again. Nothing is lost with the folder but time.
 
 use super::CliError;
-use crate::mesh::TriangleSoup;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use shapelex_core::mesh::TriangleSoup;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};

@@ -3,11 +3,11 @@
 use super::CliError;
 use super::files::MeshFile;
 use super::folders::labelled_files;
-use crate::benchmark::Category;
-use crate::benchmark::protocol::natural_key;
-use crate::mesh::{Components, Limits, PrepareOptions, TriangleSoup, prepare, read};
-use crate::sample::{ZooOptions, species};
 use rayon::prelude::*;
+use shapelex_core::mesh::{Components, Limits, PrepareOptions, TriangleSoup, prepare, read};
+use shapelex_eval::benchmark::Category;
+use shapelex_eval::benchmark::protocol::natural_key;
+use shapelex_eval::sample::{ZooOptions, species};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -149,7 +149,7 @@ pub fn of_the_zoo(classes: usize, poses: bool, seed: u64, vertices: usize) -> Re
 }
 
 /// The largest component, simplified to the working size; holes stay as they are.
-fn clean(soup: TriangleSoup, vertices: usize) -> Result<TriangleSoup, crate::mesh::MeshError> {
+fn clean(soup: TriangleSoup, vertices: usize) -> Result<TriangleSoup, shapelex_core::mesh::MeshError> {
     let options = PrepareOptions {
         components: Components::Largest,
         fill_holes_below: 0.0,

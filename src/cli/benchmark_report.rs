@@ -2,10 +2,10 @@
 
 use super::CliError;
 use super::output::table;
-use crate::benchmark::measures::RetrievalMeasures;
-use crate::benchmark::paper::{PaperRow, QUERIES, TABLE_1};
-use crate::benchmark::report::{BenchmarkReport, ClassMatrix, Count, Counts, PrecisionRecall, TOTAL};
-use crate::benchmark::{Category, Outcome, Robustness};
+use shapelex_eval::benchmark::measures::RetrievalMeasures;
+use shapelex_eval::benchmark::paper::{PaperRow, QUERIES, TABLE_1};
+use shapelex_eval::benchmark::report::{BenchmarkReport, ClassMatrix, Count, Counts, PrecisionRecall, TOTAL};
+use shapelex_eval::benchmark::{Category, Outcome, Robustness};
 use std::path::Path;
 
 /// One method's column of the paper's table.

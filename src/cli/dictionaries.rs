@@ -8,14 +8,14 @@
 
 use super::CliError;
 use super::exported_baselines::{self, Baselines};
-use crate::baseline::BaselineIndex;
-use crate::coding::Dictionary;
-use crate::parameters::{Channel, Parameters};
-use crate::pipeline::ModelReport;
-use crate::ranking::{Calibration, Index, IndexedClass, NotJudged};
 use faer::Mat;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
+use shapelex_core::baseline::BaselineIndex;
+use shapelex_core::coding::Dictionary;
+use shapelex_core::parameters::{Channel, Parameters};
+use shapelex_core::pipeline::ModelReport;
+use shapelex_core::ranking::{Calibration, Index, IndexedClass, NotJudged};
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::Arc;
@@ -276,20 +276,20 @@ mod tests {
     }
 
     fn baselines() -> BaselineIndex {
-        let shape = |label: &str, eigenvalues: &[f64]| crate::baseline::BaselineShape {
+        let shape = |label: &str, eigenvalues: &[f64]| shapelex_core::baseline::BaselineShape {
             label: label.to_owned(),
             eigenvalues: eigenvalues.to_vec(),
             distances: vec![0.25, 0.75],
             words: vec![1.0, 0.0, 0.0],
         };
-        let class = |label: &str, shapes| crate::baseline::BaselineClass {
+        let class = |label: &str, shapes| shapelex_core::baseline::BaselineClass {
             label: label.to_owned(),
             shapes,
         };
         BaselineIndex {
-            model: crate::baseline::BaselineModel {
-                distances: crate::baseline::SignatureDistances { largest: 2.5 },
-                vocabulary: crate::baseline::Vocabulary {
+            model: shapelex_core::baseline::BaselineModel {
+                distances: shapelex_core::baseline::SignatureDistances { largest: 2.5 },
+                vocabulary: shapelex_core::baseline::Vocabulary {
                     words: Mat::from_fn(4, 3, |i, j| (i * 3 + j) as f64 / 7.0),
                 },
                 seed: 9,

@@ -1,9 +1,9 @@
 //! Why a command ended early, and what it tells the shell.
 
 use super::wording;
-use crate::mesh::MeshError;
-use crate::parameters::ParameterError;
-use crate::pipeline::PipelineError;
+use shapelex_core::mesh::MeshError;
+use shapelex_core::parameters::ParameterError;
+use shapelex_core::pipeline::PipelineError;
 use std::path::Path;
 use std::process::ExitCode;
 

@@ -8,12 +8,12 @@ use super::folders::labelled_files;
 use super::progress::Progress;
 use super::refused::Refused;
 use super::{CliError, evaluation_report, output};
-use crate::benchmark::evaluate::Models;
-use crate::benchmark::retrieval::{RetrievalOutcome, coding_scores, judge_retrieval};
-use crate::benchmark::{Evaluation, LabelledShape, OpenSet, Protocol, evaluate, evaluate_open_set};
-use crate::cancel::Cancel;
-use crate::parameters::Parameters;
 use serde::Serialize;
+use shapelex_core::cancel::Cancel;
+use shapelex_core::parameters::Parameters;
+use shapelex_eval::benchmark::evaluate::Models;
+use shapelex_eval::benchmark::retrieval::{RetrievalOutcome, coding_scores, judge_retrieval};
+use shapelex_eval::benchmark::{Evaluation, LabelledShape, OpenSet, Protocol, evaluate, evaluate_open_set};
 use std::collections::BTreeMap;
 use std::time::Instant;
 

@@ -3,7 +3,7 @@
 use super::CliError;
 use super::evaluate_args::{EvaluateArgs, ProtocolName};
 use super::folders::LabelledFile;
-use crate::parameters::{Parameters, RankBy};
+use shapelex_core::parameters::{Parameters, RankBy};
 use std::collections::BTreeMap;
 use std::path::Path;
 

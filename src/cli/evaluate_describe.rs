@@ -5,12 +5,12 @@ use super::files::MeshFile;
 use super::folders::LabelledFile;
 use super::progress::Progress;
 use super::refused::Refused;
-use crate::benchmark::LabelledShape;
-use crate::cancel::Cancel;
-use crate::mesh::{Limits, MeshError, TriangleSoup, read, read_poses};
-use crate::parameters::Parameters;
-use crate::pipeline::describe_both;
 use rayon::prelude::*;
+use shapelex_core::cancel::Cancel;
+use shapelex_core::mesh::{Limits, MeshError, TriangleSoup, read, read_poses};
+use shapelex_core::parameters::Parameters;
+use shapelex_core::pipeline::describe_both;
+use shapelex_eval::benchmark::LabelledShape;
 use std::collections::BTreeMap;
 
 /// Describes every file on all cores. Files that cannot be used come back with their reason.

@@ -3,10 +3,12 @@
 use super::evaluate_describe::poses_of;
 use super::folders::LabelledFile;
 use super::{CliError, figures};
-use crate::benchmark::retrieval::RetrievalOutcome;
-use crate::benchmark::{Evaluation, OpenSet, QueryResult};
-use crate::figure::{WorstQuery, evaluation_figures, open_set_figure, retrieval_figure, worst_queries};
-use crate::mesh::TriangleSoup;
+use shapelex_core::mesh::TriangleSoup;
+use shapelex_eval::benchmark::retrieval::RetrievalOutcome;
+use shapelex_eval::benchmark::{Evaluation, OpenSet, QueryResult};
+use shapelex_eval::figure::{
+    WorstQuery, evaluation_figures, open_set_figure, retrieval_figure, worst_queries,
+};
 use std::path::Path;
 
 /// Queries that are shown in pictures.

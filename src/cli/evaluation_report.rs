@@ -2,8 +2,8 @@
 
 use super::evaluate::{Outcome, Report};
 use super::output::table;
-use crate::benchmark::retrieval::RetrievalOutcome;
-use crate::benchmark::{OpenSet, Share};
+use shapelex_eval::benchmark::retrieval::RetrievalOutcome;
+use shapelex_eval::benchmark::{OpenSet, Share};
 
 /// Confusion matrices with more classes than this do not fit a screen; they are listed instead.
 const MATRIX_CLASSES: usize = 26;

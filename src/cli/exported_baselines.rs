@@ -5,12 +5,12 @@
 //! `<class>/signature_distances` and `<class>/bag_of_words` (f32, histograms).
 
 use super::dictionaries::Tensors;
-use crate::baseline::{
-    BaselineClass, BaselineIndex, BaselineModel, BaselineShape, SignatureDistances, Vocabulary,
-};
 use faer::Mat;
 use safetensors::tensor::{Dtype, SafeTensors};
 use serde::{Deserialize, Serialize};
+use shapelex_core::baseline::{
+    BaselineClass, BaselineIndex, BaselineModel, BaselineShape, SignatureDistances, Vocabulary,
+};
 use std::collections::BTreeMap;
 
 const VOCABULARY: &str = "/vocabulary";

@@ -1,7 +1,7 @@
 //! Figures as files.
 
 use super::CliError;
-use crate::figure::{FigureError, Sheet};
+use shapelex_eval::figure::{FigureError, Sheet};
 use std::path::Path;
 
 impl From<FigureError> for CliError {

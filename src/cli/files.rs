@@ -1,8 +1,8 @@
 //! Mesh files on disk, with the buffers they refer to.
 
 use super::CliError;
-use crate::mesh::gltf::external_buffers;
-use crate::mesh::{Companion, Source};
+use shapelex_core::mesh::gltf::external_buffers;
+use shapelex_core::mesh::{Companion, Source};
 use std::io::Read;
 use std::path::Path;
 

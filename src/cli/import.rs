@@ -2,11 +2,11 @@
 
 use super::dictionaries::{Exported, load};
 use super::{CliError, data_dir, output};
-use crate::baseline::BaselineIndex;
 use crate::config::DEFAULT_DATA;
 use crate::model::{ClassName, Generation, GenerationClass, Origin};
 use crate::store::{Store, StoreError, StoreOptions};
 use serde_json::json;
+use shapelex_core::baseline::BaselineIndex;
 use std::path::PathBuf;
 
 /// Arguments of `import`.

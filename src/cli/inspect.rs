@@ -5,16 +5,16 @@ use super::query_inputs::gather;
 use super::refused::Refused;
 use super::values::poses;
 use super::{CliError, ParameterArgs, figures, output};
-use crate::cancel::Cancel;
-use crate::figure::{GalleryRow, RowView, as_large_as, gallery};
-use crate::mesh::{
-    Format, Limits, PrepareReport, ReadContext, TriangleSoup, prepare, read_poses_within, read_within,
-};
-use crate::parameters::Parameters;
-use crate::pipeline::describe_shape;
-use crate::pipeline::prepared::refined_to;
 use serde::Serialize;
 use serde_json::json;
+use shapelex_core::cancel::Cancel;
+use shapelex_core::mesh::{
+    Format, Limits, PrepareReport, ReadContext, TriangleSoup, prepare, read_poses_within, read_within,
+};
+use shapelex_core::parameters::Parameters;
+use shapelex_core::pipeline::describe_shape;
+use shapelex_core::pipeline::prepared::refined_to;
+use shapelex_eval::figure::{GalleryRow, RowView, as_large_as, gallery};
 use std::path::PathBuf;
 
 /// Arguments of `inspect`.

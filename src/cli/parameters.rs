@@ -2,8 +2,8 @@
 
 use super::CliError;
 use crate::config::preset_values;
-use crate::parameters::{ParameterError, Parameters, Preset};
 use serde_json::{Map, Value};
+use shapelex_core::parameters::{ParameterError, Parameters, Preset};
 
 /// `--preset` and `--set`.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -123,7 +123,7 @@ fn expected(values: &Map<String, Value>, key: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::{Hypothesis, RankBy};
+    use shapelex_core::parameters::{Hypothesis, RankBy};
 
     fn given(preset: Option<Preset>, set: &[&str]) -> Result<Parameters, CliError> {
         let set = set.iter().map(|&s| s.to_owned()).collect();

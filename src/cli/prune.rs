@@ -6,9 +6,9 @@ use super::encode::encode;
 use super::files::MeshFile;
 use super::folders::LabelledFile;
 use super::{CliError, listing};
-use crate::mesh::Limits;
 use serde::Serialize;
 use serde_json::Value;
+use shapelex_core::mesh::Limits;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What was deleted.

@@ -9,15 +9,15 @@ use super::query_summary::Summary;
 use super::refused::Refused;
 use super::values::{at_least_one, one_of};
 use super::{CliError, api, dictionaries, output, query_text};
-use crate::cancel::Cancel;
 use crate::http::dto::parameters::QueryRankByName;
 use crate::http::dto::query::VerdictDto;
-use crate::mesh::{Limits, ReadContext, read_within};
-use crate::parameters::RankBy;
-use crate::pipeline::prepared::refined_to;
-use crate::pipeline::{RankedClass, describe_query, judge, judged_by, rank_top};
-use crate::ranking::JUDGED;
 use serde_json::{Value, json};
+use shapelex_core::cancel::Cancel;
+use shapelex_core::mesh::{Limits, ReadContext, read_within};
+use shapelex_core::parameters::RankBy;
+use shapelex_core::pipeline::prepared::refined_to;
+use shapelex_core::pipeline::{RankedClass, describe_query, judge, judged_by, rank_top};
+use shapelex_core::ranking::JUDGED;
 use std::path::PathBuf;
 
 /// Arguments of `query`.
@@ -164,7 +164,7 @@ fn rank_against(
     description.report.warnings.splice(0..0, context.warnings.list());
     // The verdict is about the first few, however many are shown.
     let ranking = rank_top(&description.views, index, rank_by, top.max(JUDGED), &cancel)
-        .map_err(crate::pipeline::PipelineError::from)?;
+        .map_err(shapelex_core::pipeline::PipelineError::from)?;
     let calibration = exported.calibration();
     let ranked: Vec<RankedClass<'_>> = ranking
         .classes

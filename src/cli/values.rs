@@ -1,7 +1,7 @@
 //! Values of flags that several commands have.
 
-use crate::mesh::Limits;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use shapelex_core::mesh::Limits;
 
 /// A whole number of 1 or more.
 ///

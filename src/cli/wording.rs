@@ -4,7 +4,7 @@
 //! without a service there is no request. This is the one place that translates, by the problem's code.
 
 use crate::config::DEFAULT_DATA;
-use crate::mesh::MeshError;
+use shapelex_core::mesh::MeshError;
 use std::path::{Path, PathBuf};
 
 /// Where a command works.
@@ -124,7 +124,7 @@ mod tests {
                 detail: String::new(),
             }
             .into(),
-            crate::ranking::RankingError::EmptyIndex.into(),
+            shapelex_core::ranking::RankingError::EmptyIndex.into(),
             mesh.into(),
             MeshError::Empty.into(),
         ]

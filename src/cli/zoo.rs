@@ -2,9 +2,9 @@
 
 use super::progress::Progress;
 use super::{CliError, output};
-use crate::sample::{ZooOptions, species, write_glb, write_obj};
 use rayon::prelude::*;
 use serde_json::json;
+use shapelex_eval::sample::{ZooOptions, species, write_glb, write_obj};
 use std::path::{Path, PathBuf};
 
 /// The format creatures are written in.

@@ -6,7 +6,7 @@
 
 use super::metrics;
 use super::problem::{Code, Problem};
-use crate::cancel::Cancel;
+use shapelex_core::cancel::Cancel;
 use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -11,15 +11,15 @@ use super::state::Parts;
 use super::time_limit::{TimeView, rank_until};
 use super::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
-use crate::mesh::TriangleSoup;
 use crate::model::{ClassId, Generation, Origin};
-use crate::parameters::Channel;
-use crate::pipeline::estimate::{self, Role};
-use crate::pipeline::{
+use crate::store::StoreError;
+use shapelex_core::mesh::TriangleSoup;
+use shapelex_core::parameters::Channel;
+use shapelex_core::pipeline::estimate::{self, Role};
+use shapelex_core::pipeline::{
     Description, Stage, StageSpan, describe_plain, describe_query, judged_by, rank, rank_top,
 };
-use crate::ranking::{Index, JUDGED, NotJudged, SIGNIFICANCE};
-use crate::store::StoreError;
+use shapelex_core::ranking::{Index, JUDGED, NotJudged, SIGNIFICANCE};
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};

@@ -6,8 +6,8 @@
 use super::archive_path::{is_clutter, safe_path};
 use super::arriving::Arriving;
 use super::problem::{Code, Problem};
-use crate::cancel::Cancel;
-use crate::memory::{MemoryBudget, MemoryError, Reservation};
+use shapelex_core::cancel::Cancel;
+use shapelex_core::memory::{MemoryBudget, MemoryError, Reservation};
 use std::cell::Cell;
 use std::io::{Cursor, Read};
 

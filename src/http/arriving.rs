@@ -1,7 +1,7 @@
 //! Bytes that arrive piece by piece, reserved before they are kept.
 
-use crate::memory::{MemoryError, Reservation};
 use bytes::Bytes;
+use shapelex_core::memory::{MemoryError, Reservation};
 
 /// Least and most bytes that are reserved ahead of what has arrived.
 const LEAST_AHEAD: usize = 4 << 10;
@@ -95,7 +95,7 @@ impl<'a> Arriving<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::memory::MemoryBudget;
+    use shapelex_core::memory::MemoryBudget;
 
     #[test]
     fn what_has_arrived_is_reserved_and_little_more() {

@@ -1,9 +1,9 @@
 //! What all bodies have in common: how long they may be, how long they may take, and what they are called.
 
 use super::problem::{Code, Problem};
-use crate::memory::MemoryError;
 use crate::model::text::is_hidden;
 use axum::http::{HeaderMap, header};
+use shapelex_core::memory::MemoryError;
 use std::future::Future;
 use std::time::Duration;
 

@@ -3,10 +3,10 @@
 use super::archive::ArchiveLimits;
 use super::connections::ConnectionLimits;
 use crate::jobs::JobOptions;
-use crate::mesh::Limits;
 use crate::model::KeyLimits;
-use crate::parameters::Preset;
 use crate::store::StoreOptions;
+use shapelex_core::mesh::Limits;
+use shapelex_core::parameters::Preset;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::time::Duration;

@@ -6,10 +6,10 @@
 use super::problem::Code;
 use super::state::AppState;
 use crate::jobs::metrics::JOB_SECONDS;
-use crate::pipeline::Stage;
 use crate::store::ScrubReport;
 use ::metrics::{counter, describe_counter, describe_gauge, describe_histogram, gauge, histogram};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
+use shapelex_core::pipeline::Stage;
 use std::sync::OnceLock;
 use std::time::Duration;
 

@@ -1,16 +1,16 @@
 //! The one place where errors of the layers below become problems.
 
 use super::problem::{Code, Problem};
-use crate::coding::CodingError;
 use crate::jobs::JobError;
-use crate::memory::MemoryError;
-use crate::mesh::MeshError;
 use crate::model::{ClassNameError, KeyNameError};
-use crate::parameters::ParameterError;
-use crate::pipeline::PipelineError;
-use crate::ranking::RankingError;
-use crate::spectral::SpectralError;
 use crate::store::{OriginalDamage, StoreError};
+use shapelex_core::coding::CodingError;
+use shapelex_core::memory::MemoryError;
+use shapelex_core::mesh::MeshError;
+use shapelex_core::parameters::ParameterError;
+use shapelex_core::pipeline::PipelineError;
+use shapelex_core::ranking::RankingError;
+use shapelex_core::spectral::SpectralError;
 
 impl From<MeshError> for Problem {
     fn from(error: MeshError) -> Self {

@@ -1,8 +1,8 @@
 //! A ranking by whatever method, as the answer needs it.
 
-use crate::baseline::{Nearest, nearest_classes};
-use crate::pipeline::{RankedClass, judge};
-use crate::ranking::{Calibration, ClassScore, NotJudged, Ranking, Verdict};
+use shapelex_core::baseline::{Nearest, nearest_classes};
+use shapelex_core::pipeline::{RankedClass, judge};
+use shapelex_core::ranking::{Calibration, ClassScore, NotJudged, Ranking, Verdict};
 
 /// A class and its score.
 pub(super) struct Class {

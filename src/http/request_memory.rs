@@ -1,13 +1,13 @@
 //! The memory of a request, from the first byte of its body to the last of its answer.
 
 use super::problem::Problem;
-use crate::memory::{MemoryBudget, Reservation};
 use axum::body::{Body, HttpBody};
 use axum::extract::Request;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 use futures_util::StreamExt;
 use http_body::{Frame, SizeHint};
+use shapelex_core::memory::{MemoryBudget, Reservation};
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};

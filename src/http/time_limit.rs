@@ -4,10 +4,10 @@
 //! when time is up is ordered and answered, and what was not is named.
 
 use super::problem::{Code, Problem};
-use crate::cancel::Cancel;
-use crate::coding::CodingError;
-use crate::parameters::RankBy;
-use crate::ranking::{Index, IndexedClass, Ranking, RankingError, View, rank};
+use shapelex_core::cancel::Cancel;
+use shapelex_core::coding::CodingError;
+use shapelex_core::parameters::RankBy;
+use shapelex_core::ranking::{Index, IndexedClass, Ranking, RankingError, View, rank};
 use std::time::Duration;
 
 /// The end of a query's time. Dropping it is the end too, so that the work stops where the client goes away.
@@ -129,9 +129,9 @@ fn order(ranking: &mut Ranking) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cancel::Cancelled;
-    use crate::parameters::Hypothesis;
-    use crate::ranking::ClassScore;
+    use shapelex_core::cancel::Cancelled;
+    use shapelex_core::parameters::Hypothesis;
+    use shapelex_core::ranking::ClassScore;
     use std::collections::BTreeMap;
 
     fn class(label: &str) -> IndexedClass {

@@ -10,12 +10,12 @@ use super::multipart::receive_multipart;
 use super::problem::{Code, Problem};
 use super::request_memory;
 use super::uploaded::{Part, UploadedMesh};
-use crate::memory::Reservation;
-use crate::mesh::{Format, MeshError};
 use crate::model::text::is_hidden;
 use axum::extract::Request;
 use axum::http::{HeaderMap, header};
 use futures_util::StreamExt;
+use shapelex_core::memory::Reservation;
+use shapelex_core::mesh::{Format, MeshError};
 use std::sync::Arc;
 use tracing::{Instrument, info_span};
 

@@ -1,11 +1,11 @@
 //! A mesh as it was sent, and the buffers a glTF finds beside it.
 
 use super::problem::Problem;
-use crate::cancel::Cancel;
-use crate::memory::Reservation;
-use crate::mesh::gltf::external_buffers;
-use crate::mesh::{Companion, Format, Limits, Pose, ReadContext, Source, TriangleSoup};
 use bytes::Bytes;
+use shapelex_core::cancel::Cancel;
+use shapelex_core::memory::Reservation;
+use shapelex_core::mesh::gltf::external_buffers;
+use shapelex_core::mesh::{Companion, Format, Limits, Pose, ReadContext, Source, TriangleSoup};
 use std::sync::Arc;
 
 /// A file of a request's body.
@@ -58,7 +58,7 @@ impl UploadedMesh {
         let (format, soup) = {
             let _floor = context.memory.hold(self.reading_bytes())?;
             let companions = self.companions();
-            crate::mesh::read_within(&self.source(&companions), context)?
+            shapelex_core::mesh::read_within(&self.source(&companions), context)?
         };
         context.memory.grow(soup_bytes(&soup))?;
         Ok((format, soup))
@@ -76,7 +76,7 @@ impl UploadedMesh {
         let (format, poses) = {
             let _floor = context.memory.hold(self.reading_bytes())?;
             let companions = self.companions();
-            crate::mesh::read_poses_within(&self.source(&companions), poses, context)?
+            shapelex_core::mesh::read_poses_within(&self.source(&companions), poses, context)?
         };
         let bytes = poses.iter().map(|pose| soup_bytes(&pose.soup)).sum();
         context.memory.grow(bytes)?;

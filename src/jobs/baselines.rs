@@ -3,10 +3,10 @@
 use super::describe::Describer;
 use super::failure::{MEMORY_EXCEEDED, ReindexError, no_memory};
 use super::reindex::{Reindex, stop_if_cancelled};
-use crate::baseline::{BaselineModel, thinned};
-use crate::memory::MemoryError;
 use crate::model::{Generation, GenerationClass, Origin, Shape};
 use crate::store::{Store, StoreError};
+use shapelex_core::baseline::{BaselineModel, thinned};
+use shapelex_core::memory::MemoryError;
 
 /// Shapes at most that take part in finding what all share, evenly spread over the classes.
 const LEARNT_FROM: usize = 128;

@@ -37,7 +37,7 @@ pub enum JobError {
     Paused,
     /// The parameters of the job are not usable.
     #[error(transparent)]
-    Parameter(#[from] crate::parameters::ParameterError),
+    Parameter(#[from] shapelex_core::parameters::ParameterError),
     /// The service is going down.
     #[error("the service is shutting down")]
     ShuttingDown,

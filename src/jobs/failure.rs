@@ -1,10 +1,10 @@
 //! Why a reindex ended early, and the stable names of failures.
 
-use crate::memory::MemoryError;
-use crate::mesh::MeshError;
 use crate::model::JobFailure;
-use crate::pipeline::PipelineError;
 use crate::store::StoreError;
+use shapelex_core::memory::MemoryError;
+use shapelex_core::mesh::MeshError;
+use shapelex_core::pipeline::PipelineError;
 use std::any::Any;
 
 /// Why a reindex ended early.

@@ -1,10 +1,10 @@
 //! The index in memory.
 
 use super::trim;
-use crate::baseline::BaselineIndex;
 use crate::model::Generation;
-use crate::ranking::{Calibration, Index, IndexedClass, NotJudged};
 use crate::store::{Store, StoreError};
+use shapelex_core::baseline::BaselineIndex;
+use shapelex_core::ranking::{Calibration, Index, IndexedClass, NotJudged};
 
 /// The index queries run against. A query holds the one it began with, whatever is switched in meanwhile.
 #[derive(Clone, Debug)]

@@ -22,12 +22,12 @@ mod worker;
 pub use error::JobError;
 pub use live::LiveIndex;
 
-use crate::cancel::Cancel;
-use crate::mesh::Limits;
 use crate::model::{ContentHash, Job, JobId, JobKind, JobState};
 use crate::store::Store;
 use arc_swap::ArcSwap;
 use jiff::Timestamp;
+use shapelex_core::cancel::Cancel;
+use shapelex_core::mesh::Limits;
 use std::collections::{HashMap, VecDeque};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

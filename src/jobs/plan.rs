@@ -2,8 +2,8 @@
 
 use super::failure::ReindexError;
 use crate::model::{Class, ClassId, Generation, GenerationClass, Origin, ReindexScope, Shape, SkippedClass};
-use crate::parameters::Parameters;
 use crate::store::{Store, StoreError};
+use shapelex_core::parameters::Parameters;
 use std::collections::BTreeMap;
 
 /// A class to learn.

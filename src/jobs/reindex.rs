@@ -8,19 +8,19 @@ use super::plan::{Plan, ToLearn, plan, shape_key, skipped};
 use super::progress::Progress;
 use super::share::{Share, index_bytes};
 use super::trim;
-use crate::cancel::Cancel;
-use crate::memory::MemoryError;
-use crate::mesh::Limits;
 use crate::model::{
     FailedShape, Generation, GenerationClass, GenerationShape, Origin, ReindexReport, ReindexScope,
     RelearnedClass, Shape, SkippedClass,
 };
-use crate::parameters::Parameters;
-use crate::pipeline::estimate;
-use crate::pipeline::{Description, PipelineError, held_out_scores, learn_model};
 use crate::store::{Store, StoreError};
 use arc_swap::ArcSwap;
 use jiff::Timestamp;
+use shapelex_core::cancel::Cancel;
+use shapelex_core::memory::MemoryError;
+use shapelex_core::mesh::Limits;
+use shapelex_core::parameters::Parameters;
+use shapelex_core::pipeline::estimate;
+use shapelex_core::pipeline::{Description, PipelineError, held_out_scores, learn_model};
 use std::sync::Arc;
 
 /// What is asked, and with what.

@@ -3,9 +3,9 @@
 //! The share is divided before work begins, by what each task may take at most: a task that waited for memory in the
 //! middle of its work could wait for another one that the same thread has begun.
 
-use crate::memory::{MemoryBudget, MemoryError};
 use crate::model::Generation;
 use rayon::prelude::*;
+use shapelex_core::memory::{MemoryBudget, MemoryError};
 use std::cmp::Reverse;
 use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -1,10 +1,10 @@
 //! What an index generation consists of.
 
 use super::{ClassId, ClassName, ShapeId};
-use crate::parameters::Parameters;
-use crate::pipeline::ModelReport;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
+use shapelex_core::parameters::Parameters;
+use shapelex_core::pipeline::ModelReport;
 
 /// One generation of the index: which dictionaries queries are ranked against. Never changes once written; the next
 /// one is written beside it and takes over by one atomic write.

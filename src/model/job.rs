@@ -1,9 +1,9 @@
 //! Background work: what was asked, how far it is, how it ended.
 
 use super::{ClassId, JobId, ShapeId};
-use crate::parameters::Parameters;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
+use shapelex_core::parameters::Parameters;
 
 /// Which classes a reindex learns again. Changed parameters make every class stale.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

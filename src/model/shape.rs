@@ -1,10 +1,10 @@
 //! A training shape and the file it came from.
 
 use super::{ClassId, ShapeId};
-use crate::mesh::{Companion, Format, PrepareReport};
 use bytes::Bytes;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
+use shapelex_core::mesh::{Companion, Format, PrepareReport};
 use std::fmt;
 use std::str::FromStr;
 

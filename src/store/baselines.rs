@@ -7,12 +7,12 @@ use super::event::{get, put};
 use super::payload::{only, pack, unpack};
 use super::record::{Family, Record};
 use super::{Batch, Store, StoreError, keys};
-use crate::baseline::{
-    BaselineClass, BaselineIndex, BaselineModel, BaselineShape, SignatureDistances, Vocabulary,
-};
 use crate::model::{Generation, GenerationClass, ShapeId};
 use faer::Mat;
 use serde::{Deserialize, Serialize};
+use shapelex_core::baseline::{
+    BaselineClass, BaselineIndex, BaselineModel, BaselineShape, SignatureDistances, Vocabulary,
+};
 
 #[derive(Serialize, Deserialize)]
 struct ModelV1 {

@@ -3,10 +3,10 @@
 use super::payload::only;
 use super::record::{Family, Record};
 use super::{Store, StoreError, backend::Batch, keys, record};
-use crate::coding::{Dictionary, PreparedRoom};
 use crate::model::Generation;
-use crate::parameters::Channel;
-use crate::ranking::{Index, IndexedClass, IndexedShape};
+use shapelex_core::coding::{Dictionary, PreparedRoom};
+use shapelex_core::parameters::Channel;
+use shapelex_core::ranking::{Index, IndexedClass, IndexedShape};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -8,9 +8,9 @@ use super::record::{Record, seal, unseal};
 use super::usage::{note_class, note_shape};
 use super::{StoreError, keys};
 use crate::model::{ApiKey, Class, ClassId, ClassName, ContentHash, KeyId, Shape, ShapeId};
-use crate::parameters::Parameters;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
+use shapelex_core::parameters::Parameters;
 
 /// A change of the catalogue.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

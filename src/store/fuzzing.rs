@@ -7,8 +7,8 @@ use super::idempotency::Remembered;
 use super::payload::{Link, Number};
 use super::record::{Record, check as check_envelope, seal, unseal};
 use crate::model::{ApiKey, Class, Generation, Job, Shape};
-use crate::parameters::Parameters;
-use crate::pipeline::Description;
+use shapelex_core::parameters::Parameters;
+use shapelex_core::pipeline::Description;
 
 /// Decodes bytes as a record: the first byte chooses the family, the second the version, the rest is the payload. The
 /// same bytes are also taken for a whole envelope and for a line of the catalogue log.

@@ -4,7 +4,7 @@
 use super::layout::ORIGINALS;
 use super::{Batch, Store, StoreError, baselines, files, keys, record};
 use crate::model::{ContentHash, Generation, Shape};
-use crate::parameters::Parameters;
+use shapelex_core::parameters::Parameters;
 use std::collections::BTreeSet;
 use std::sync::PoisonError;
 

@@ -4,7 +4,7 @@ use super::event::{Event, get, put};
 use super::payload::Number;
 use super::{Batch, Store, StoreError, keys};
 use crate::model::Generation;
-use crate::parameters::Parameters;
+use shapelex_core::parameters::Parameters;
 
 impl Store {
     /// The current generation; `None` before the first reindex.

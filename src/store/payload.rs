@@ -3,12 +3,12 @@
 //! What grows often and describes itself (parameters and reports) is kept as JSON text inside the payload.
 
 use super::record::{Family, Record};
-use crate::mesh::Format;
 use crate::model::{Class, ClassId, ClassName, CompanionFile, ContentHash, JobId, Shape, ShapeId, ShapePose};
-use crate::parameters::Parameters;
 use jiff::Timestamp;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use shapelex_core::mesh::Format;
+use shapelex_core::parameters::Parameters;
 
 pub(super) fn pack<T: Serialize>(value: &T) -> Result<Vec<u8>, String> {
     postcard::to_stdvec(value).map_err(|e| e.to_string())

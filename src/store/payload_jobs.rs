@@ -242,7 +242,7 @@ impl Record for Job {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::Parameters;
+    use shapelex_core::parameters::Parameters;
 
     fn first(dictionary: &str) -> GenerationV1 {
         GenerationV1 {

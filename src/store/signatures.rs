@@ -6,14 +6,14 @@
 use super::payload::{from_json, only, pack, to_json, unpack};
 use super::record::{Family, Record, seal, unseal};
 use super::{Store, StoreError, files};
-use crate::mesh::PrepareReport;
 use crate::model::ContentHash;
-use crate::parameters::{Channel, Hypothesis};
-use crate::pipeline::Description;
-use crate::ranking::View;
-use crate::signature::Signatures;
 use faer::Mat;
 use serde::{Deserialize, Serialize};
+use shapelex_core::mesh::PrepareReport;
+use shapelex_core::parameters::{Channel, Hypothesis};
+use shapelex_core::pipeline::Description;
+use shapelex_core::ranking::View;
+use shapelex_core::signature::Signatures;
 use std::path::PathBuf;
 
 #[derive(Serialize, Deserialize)]
@@ -119,7 +119,7 @@ impl Store {
     }
 
     /// The cached description of a shape under parameters of the given
-    /// [`description_fingerprint`](crate::parameters::Parameters::description_fingerprint); `None` where there is
+    /// [`description_fingerprint`](shapelex_core::parameters::Parameters::description_fingerprint); `None` where there is
     /// none, or none that can be read.
     pub fn signatures(&self, identity: ContentHash, fingerprint: &str) -> Option<Description> {
         let name = file_name(identity, fingerprint);

@@ -8,7 +8,7 @@
 //!
 //! The long form goes round the same attacks with 1000 connections until the time is over. Clients speak over real sockets
 //! to the real binary; its resident size comes from `/proc`.
-#![cfg(all(feature = "service", target_os = "linux"))]
+#![cfg(target_os = "linux")]
 
 #[allow(dead_code, reason = "shared with tests/service")]
 #[path = "../service/meshes.rs"]

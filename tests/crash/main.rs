@@ -3,7 +3,7 @@
 //!
 //! `SHAPELEX_KILLS` sets how often it is killed (30 unless told otherwise; a night takes 500), `SHAPELEX_STARTS` how
 //! often it starts on a full disk (16), `SHAPELEX_SEED` where the randomness starts.
-#![cfg(all(feature = "service", unix))]
+#![cfg(unix)]
 
 mod client;
 mod denied;

@@ -2,9 +2,9 @@
 
 use crate::process::Service;
 use faer::Mat;
-use shapelex::coding::Dictionary;
-use shapelex::parameters::Channel;
 use shapelex::store::{Dictionaries, Store, StoreOptions};
+use shapelex_core::coding::Dictionary;
+use shapelex_core::parameters::Channel;
 use std::path::Path;
 use std::sync::Arc;
 

@@ -10,7 +10,7 @@ mod polygon;
 #[path = "../../fuzz/src/request.rs"]
 mod request;
 
-use shapelex::mesh::Format;
+use shapelex_core::mesh::Format;
 use std::path::Path;
 use std::time::{Duration, Instant};
 

@@ -2,7 +2,7 @@
 //! or as long as `SHAPELEX_MUTATE_SECONDS` says.
 
 use crate::mesh;
-use shapelex::mesh::Format;
+use shapelex_core::mesh::Format;
 use std::path::Path;
 use std::time::{Duration, Instant};
 

@@ -3,7 +3,7 @@
 
 use crate::{LIMIT, MEMORY, peak};
 use serde_json::{Value, json};
-use shapelex::mesh::{Limits, MeshError, Source, read, read_poses};
+use shapelex_core::mesh::{Limits, MeshError, Source, read, read_poses};
 use std::time::Duration;
 
 /// How a reading is to end.

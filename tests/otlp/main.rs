@@ -10,7 +10,7 @@ use axum::body::Bytes;
 use axum::http::StatusCode;
 use axum::routing::post;
 use protobuf::Span;
-use shapelex::sample::{ZooOptions, creatures, species, write_obj};
+use shapelex_eval::sample::{ZooOptions, creatures, species, write_obj};
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};

@@ -3,9 +3,9 @@
 #[path = "../../benches/scale/zoo.rs"]
 mod zoo;
 
-use shapelex::cancel::Cancel;
-use shapelex::parameters::{Channel, Hypothesis, RankBy};
-use shapelex::ranking::{Index, IndexedShape, Ranking, View, rank, rank_top};
+use shapelex_core::cancel::Cancel;
+use shapelex_core::parameters::{Channel, Hypothesis, RankBy};
+use shapelex_core::ranking::{Index, IndexedShape, Ranking, View, rank, rank_top};
 use std::sync::LazyLock;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;

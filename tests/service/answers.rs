@@ -7,7 +7,7 @@ use axum::http::Request;
 use serde_json::{Value, json};
 use shapelex::http::AppState;
 use shapelex::http::ServiceConfig;
-use shapelex::sample::{Species, ZooOptions, write_obj};
+use shapelex_eval::sample::{Species, ZooOptions, write_obj};
 use std::process::Command;
 
 fn pose(species: &Species, pose: usize) -> Vec<u8> {

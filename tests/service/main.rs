@@ -1,5 +1,4 @@
 //! The service, driven through its router: one binary, no sockets.
-#![cfg(feature = "service")]
 
 mod answers;
 mod bad_input;

@@ -1,9 +1,9 @@
 //! Classes, shapes and files, on the real engine.
 
 use crate::{name, shape};
-use shapelex::mesh::Companion;
 use shapelex::model::{ClassId, ContentHash, Job, JobKind, JobState, ReindexScope, ShapeId};
 use shapelex::store::{Store, StoreError, StoreOptions};
+use shapelex_core::mesh::Companion;
 use tempfile::TempDir;
 
 fn open(directory: &TempDir) -> Store {

@@ -4,8 +4,8 @@ use crate::jobs::{class_of, done, open, reindex, small, start, surface_shape, wa
 use crate::name;
 use shapelex::jobs::Jobs;
 use shapelex::model::{ClassId, Generation, GenerationClass, JobState, Origin, ReindexScope};
-use shapelex::parameters::Parameters;
 use shapelex::store::Store;
+use shapelex_core::parameters::Parameters;
 use tempfile::TempDir;
 
 /// A store whose class `imported` has dictionaries and no shapes, as `import` leaves it.

@@ -2,13 +2,13 @@
 
 use crate::name;
 use bytes::Bytes;
-use shapelex::cancel::Cancel;
 use shapelex::jobs::{JobError, JobOptions, Jobs};
-use shapelex::mesh::{Format, Limits, PrepareReport, Source};
 use shapelex::model::{ClassId, Job, JobId, JobKind, JobState, NewShape, ReindexScope};
-use shapelex::parameters::{Channel, Parameters};
-use shapelex::pipeline::{describe_query, rank};
 use shapelex::store::{Store, StoreOptions};
+use shapelex_core::cancel::Cancel;
+use shapelex_core::mesh::{Format, Limits, PrepareReport, Source};
+use shapelex_core::parameters::{Channel, Parameters};
+use shapelex_core::pipeline::{describe_query, rank};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 use std::path::Path;
@@ -122,7 +122,7 @@ fn best(jobs: &Jobs, lobes: f64) -> String {
         bytes: &bytes,
         ..Source::default()
     };
-    let (_, soup) = shapelex::mesh::read(&source, &Limits::default()).unwrap();
+    let (_, soup) = shapelex_core::mesh::read(&source, &Limits::default()).unwrap();
     let live = jobs.live_index();
     let query = describe_query(soup, &live.index.parameters, &Cancel::new(), &|_| {}).unwrap();
     let ranking = rank(

@@ -1,5 +1,4 @@
 //! The store and the job queue: durability, recovery, faults at every write, and the indexing worker.
-#![cfg(feature = "service")]
 
 mod catalogue;
 mod faults;
@@ -13,8 +12,8 @@ mod snapshots;
 mod traps;
 
 use bytes::Bytes;
-use shapelex::mesh::{Format, PrepareReport};
 use shapelex::model::{ClassName, NewShape, ShapePose};
+use shapelex_core::mesh::{Format, PrepareReport};
 
 /// A shape with contents of the test's choice; the store never looks into them.
 pub fn shape(contents: &str, pose: Option<usize>) -> NewShape {

@@ -2,10 +2,10 @@
 
 use crate::name;
 use faer::Mat;
-use shapelex::coding::Dictionary;
 use shapelex::model::{Job, JobKind, ReindexScope};
-use shapelex::parameters::Channel;
 use shapelex::store::{Dictionaries, Store, StoreOptions};
+use shapelex_core::coding::Dictionary;
+use shapelex_core::parameters::Channel;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};

@@ -1,11 +1,11 @@
 //! The method's parameters on the wire.
 
-use crate::baseline::Baseline;
-use crate::mesh::Components;
-use crate::parameters::{Hypothesis, Parameters, Preset, RankBy};
-use crate::signature::descriptor::{Descriptor, WksRange};
-use crate::signature::normalise::Normalisation;
 use serde::{Deserialize, Serialize};
+use shapelex_core::baseline::Baseline;
+use shapelex_core::mesh::Components;
+use shapelex_core::parameters::{Hypothesis, Parameters, Preset, RankBy};
+use shapelex_core::signature::descriptor::{Descriptor, WksRange};
+use shapelex_core::signature::normalise::Normalisation;
 use utoipa::ToSchema;
 
 /// Mirrors a domain enum of unit variants.

@@ -3,8 +3,8 @@
 use super::class::ClassRef;
 use super::parameters::{HypothesisName, ParametersDto, QueryRankByName};
 use super::shape::ReportDto;
-use crate::ranking::{Verdict, VerdictKind};
 use serde::{Deserialize, Serialize};
+use shapelex_core::ranking::{Verdict, VerdictKind};
 use std::collections::BTreeMap;
 use utoipa::{IntoParams, ToSchema};
 

@@ -2,10 +2,10 @@
 
 use super::class::ClassDto;
 use super::time;
-use crate::mesh::PrepareReport;
 use crate::model::Shape;
 use crate::store::AddedShape;
 use serde::{Deserialize, Serialize};
+use shapelex_core::mesh::PrepareReport;
 use utoipa::{IntoParams, ToSchema};
 
 /// How shapes are uploaded.

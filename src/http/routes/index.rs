@@ -8,10 +8,10 @@ use crate::http::dto::{Page, PageQuery};
 use crate::http::extract::ApiQuery;
 use crate::http::problem::Problem;
 use crate::model::{Class, ClassId, GenerationClass};
-use crate::parameters::{Parameters, Preset};
 use crate::store::Store;
 use axum::Json;
 use axum::extract::State;
+use shapelex_core::parameters::{Parameters, Preset};
 use std::collections::BTreeMap;
 
 /// The list its cursors belong to.

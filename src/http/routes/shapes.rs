@@ -14,7 +14,6 @@ use crate::http::request_memory::file_body;
 use crate::http::state::Parts;
 use crate::http::upload;
 use crate::http::uploaded::UploadedMesh;
-use crate::mesh::{Limits, PrepareOptions, ReadContext, TriangleSoup, prepare_within};
 use crate::model::{Class, ClassName, NewShape, Shape, ShapeId, ShapePose};
 use crate::store::{AddedShape, StoreError};
 use axum::Json;
@@ -23,6 +22,7 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use futures_util::{StreamExt, stream};
 use serde_json::Value;
+use shapelex_core::mesh::{Limits, PrepareOptions, ReadContext, TriangleSoup, prepare_within};
 use std::sync::{Arc, PoisonError};
 use tokio::io::AsyncReadExt;
 

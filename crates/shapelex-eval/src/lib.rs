@@ -1,0 +1,10 @@
+//! # shapelex-eval
+//!
+//! Evaluation of [`shapelex_core`]: procedural articulated creatures to try it on, deformations, protocols over labelled
+//! shapes, retrieval measures, and figures.
+//!
+//! Data flows one way: `sample → benchmark → figure`.
+
+pub mod benchmark;
+pub mod figure;
+pub mod sample;
