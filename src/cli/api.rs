@@ -46,26 +46,6 @@ pub fn upload(
     })
 }
 
-/// Ranks a file against the index. The answer is the API's `QueryAnswer`.
-///
-/// # Errors
-/// As [`upload`].
-pub fn query(
-    client: &Client,
-    file: MeshFile,
-    top: Option<usize>,
-    rank_by: Option<&str>,
-) -> Result<Value, CallError> {
-    let mut path = format!("/v1/query?name={}", encode(&file.name));
-    if let Some(top) = top {
-        path += &format!("&top={top}");
-    }
-    if let Some(rank_by) = rank_by {
-        path += &format!("&rank_by={}", encode(rank_by));
-    }
-    client.call("POST", &path, mesh_payload(file))
-}
-
 /// Starts a reindex and follows it to its end. `scope` is the API's: "stale", "all" or a list of classes. The answer is
 /// the job.
 ///
@@ -84,7 +64,7 @@ pub fn reindex(client: &Client, parameters: &ParameterArgs, scope: Value) -> Res
 }
 
 /// A file with its buffers as multipart, a file without as it is.
-fn mesh_payload(file: MeshFile) -> Payload {
+pub(super) fn mesh_payload(file: MeshFile) -> Payload {
     if file.companions.is_empty() {
         return Payload::Bytes("application/octet-stream".to_owned(), file.bytes);
     }

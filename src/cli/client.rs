@@ -3,6 +3,7 @@
 //! Local commands call the very routes a client calls, without a socket in between, so there is one implementation of
 //! uploading, indexing and querying.
 
+use super::outcome::outcome;
 use super::wording::{self, Place};
 use super::{CliError, data_dir, trust};
 use crate::config::{Config, DEFAULT_LISTEN};
@@ -18,6 +19,7 @@ use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tower::ServiceExt;
+use ureq::tls::TlsConfig;
 
 /// Longest answer that is read; a ranking of ten thousand classes has a few megabytes.
 const MAX_ANSWER_BYTES: u64 = 256 << 20;
@@ -90,8 +92,8 @@ impl TargetArgs {
 }
 
 impl OperatorArgs {
-    /// As [`TargetArgs::client`]. On a data directory that a service runs on it is that service's client. Without an API
-    /// key it brings the token that the service keeps in its data directory.
+    /// As [`TargetArgs::client`]. On a data directory that a service runs on it is that service's client, also where it
+    /// speaks TLS. Without an API key it brings the token that the service keeps in its data directory.
     ///
     /// # Errors
     /// As [`TargetArgs::client`].
@@ -137,7 +139,8 @@ impl OperatorArgs {
             data.display(),
             access.url
         );
-        remote(&access.url, Some(access.token))
+        let client = Client::with_trust(&access.url, trust::this_machine())?;
+        Ok(client.with_key(self.api_key.clone().or(Some(access.token))))
     }
 }
 
@@ -171,6 +174,20 @@ pub enum Payload {
     Json(Value),
     /// Bytes with their content type.
     Bytes(String, Vec<u8>),
+}
+
+impl Payload {
+    /// Its content type and bytes.
+    pub(super) fn parts(self) -> (Option<String>, Vec<u8>) {
+        match self {
+            Self::Empty => (None, Vec::new()),
+            Self::Json(value) => (
+                Some("application/json".to_owned()),
+                value.to_string().into_bytes(),
+            ),
+            Self::Bytes(content_type, bytes) => (Some(content_type), bytes),
+        }
+    }
 }
 
 /// Why a call gave no answer.
@@ -235,6 +252,10 @@ impl Client {
     /// # Errors
     /// [`CliError::Usage`] where the address is neither `http://…` nor `https://…`, or the file is not usable.
     pub fn remote(url: &str, ca_cert: Option<&Path>) -> Result<Self, CliError> {
+        Self::with_trust(url, trust::config(ca_cert)?)
+    }
+
+    fn with_trust(url: &str, trust: TlsConfig) -> Result<Self, CliError> {
         let base = url.trim_end_matches('/').to_owned();
         if !["http://", "https://"].iter().any(|scheme| {
             base.strip_prefix(scheme)
@@ -247,7 +268,7 @@ impl Client {
         let agent = ureq::Agent::config_builder()
             .http_status_as_error(false)
             .timeout_connect(Some(Duration::from_secs(10)))
-            .tls_config(trust::config(ca_cert)?)
+            .tls_config(trust)
             .build()
             .new_agent();
         Ok(Self(Transport::Remote {
@@ -317,19 +338,12 @@ impl Client {
     /// # Errors
     /// [`CallError::Refused`] for every status but 2xx, [`CallError::Unreachable`] where nobody answers.
     pub fn call(&self, method: &str, path: &str, payload: Payload) -> Result<Value, CallError> {
-        let (content_type, body) = match payload {
-            Payload::Empty => (None, Vec::new()),
-            Payload::Json(value) => (
-                Some("application/json".to_owned()),
-                value.to_string().into_bytes(),
-            ),
-            Payload::Bytes(content_type, bytes) => (Some(content_type), bytes),
-        };
+        let (content_type, body) = payload.parts();
         let (status, bytes) = self.send(method, path, content_type, body)?;
         outcome(status, &bytes).map_err(|error| error.worded(&self.place()))
     }
 
-    fn send(
+    pub(super) fn send(
         &self,
         method: &str,
         path: &str,
@@ -384,19 +398,6 @@ impl Client {
             }
         }
     }
-}
-
-/// An answer's JSON, or why there is none.
-pub(super) fn outcome(status: u16, bytes: &[u8]) -> Result<Value, CallError> {
-    let value = serde_json::from_slice(bytes).unwrap_or(Value::Null);
-    if (200..300).contains(&status) {
-        return Ok(value);
-    }
-    let text = |name: &str| value.get(name).and_then(Value::as_str).map(str::to_owned);
-    Err(CallError::Refused {
-        code: text("code").unwrap_or_else(|| status.to_string()),
-        detail: text("detail").unwrap_or_else(|| format!("the service answered with status {status}")),
-    })
 }
 
 impl Drop for Client {

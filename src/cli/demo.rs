@@ -5,7 +5,7 @@ use super::demo_report::{Answer, Summary};
 use super::files::MeshFile;
 use super::progress::Progress;
 use super::zoo::{Specimen, ZooFormat, specimens, write};
-use super::{CliError, ParameterArgs, api, data_dir, output, service};
+use super::{CliError, ParameterArgs, api, ask, data_dir, output, service};
 use crate::config::Config;
 use crate::http::ServiceConfig;
 use rayon::prelude::*;
@@ -174,7 +174,7 @@ fn query(client: &Client, specimens: &[Specimen]) -> Result<Vec<Answer>, CliErro
     let answers = specimens
         .par_iter()
         .map(|specimen| {
-            let value = api::query(client, file(specimen), None, None)
+            let value = ask::query(client, file(specimen))
                 .map_err(|error| CliError::Failed(format!("{}: {error}", specimen.name)))?;
             progress.tick();
             Ok(Answer::new(&specimen.class, &specimen.name, value))

@@ -3,7 +3,7 @@
 use super::evaluate::{Outcome, Report};
 use super::output::table;
 use shapelex_eval::benchmark::retrieval::RetrievalOutcome;
-use shapelex_eval::benchmark::{OpenSet, Share};
+use shapelex_eval::benchmark::{AtLevel, OpenSet, Share};
 
 /// Confusion matrices with more classes than this do not fit a screen; they are listed instead.
 const MATRIX_CLASSES: usize = 26;
@@ -81,11 +81,39 @@ fn open_set(outcome: &OpenSet) -> String {
     for (class, share) in &outcome.refused_by_class {
         rows.push(row(&format!("    {class}"), share));
     }
-    format!(
+    let mut text = format!(
         "\nopen set, {:.2} possible classes on average\n{}",
         outcome.mean_set_size,
         table(&["", ">shapes", ">of", ">"], &rows)
-    )
+    );
+    if !outcome.by_level.is_empty() {
+        text += &format!("\n\n{}", by_level(&outcome.by_level));
+    }
+    text
+}
+
+/// How often the possible classes hold the true one, beside what their level promises.
+fn by_level(levels: &[AtLevel]) -> String {
+    let rows: Vec<Vec<String>> = levels
+        .iter()
+        .map(|at| {
+            vec![
+                format!("{:.2}", at.level),
+                format!("{:.0} %", 100.0 * (1.0 - at.level)),
+                format!("{:.1} %", 100.0 * at.covered.value()),
+                at.covered.count.to_string(),
+                at.covered.total.to_string(),
+            ]
+        })
+        .collect();
+    let header = [
+        ">p-value above",
+        ">promised",
+        ">hold the true class",
+        ">shapes",
+        ">of",
+    ];
+    table(&header, &rows)
 }
 
 fn summary(report: &Report) -> String {

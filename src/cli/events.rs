@@ -1,6 +1,7 @@
 //! Server-sent events of a service, as they come.
 
-use super::client::{CallError, Client, Transport, outcome};
+use super::client::{CallError, Client, Transport};
+use super::outcome::outcome;
 use super::transfer::{authorized, unreachable};
 use axum::body::Body;
 use axum::http::Request;

@@ -165,21 +165,18 @@ impl Inspection {
             format!("{} vertices, {} faces", r.input_vertices, r.input_faces),
         );
         row("cleaned", cleaned(r));
-        let simplified = r
-            .simplified_from
-            .map(|from| format!(", simplified from {from}"))
-            .unwrap_or_default();
-        let refined = r
-            .refined_to
-            .map(|to| format!(", refined to {to} vertices"))
-            .unwrap_or_default();
+        let simplified = match r.simplified_from {
+            Some(_) => "simplified to ",
+            None => "",
+        };
+        let refined = match r.refined_to {
+            Some(to) => format!(", refined to {to} vertices for the spectrum"),
+            None => String::new(),
+        };
         row(
             "prepared",
-            format!("{} vertices, {} faces{simplified}{refined}", r.vertices, r.faces),
+            format!("{simplified}{} vertices, {} faces{refined}", r.vertices, r.faces),
         );
-        if let Some(to) = self.refined_to {
-            row("refined", format!("to about {to} vertices for its spectrum"));
-        }
         let boundary = if r.boundary_edges == 0 {
             "closed".to_owned()
         } else {

@@ -5,6 +5,7 @@
 //! wrong.
 
 mod api;
+mod ask;
 pub mod benchmark;
 pub mod benchmark_args;
 mod benchmark_cache;
@@ -41,6 +42,7 @@ pub mod keys;
 mod listing;
 pub mod manual;
 mod openapi;
+mod outcome;
 mod output;
 mod parameters;
 mod parse;

@@ -1,21 +1,24 @@
 //! `shapelex query`: which class a mesh belongs to.
 
-use super::client::{Client, TargetArgs};
+use super::ask::Question;
+use super::client::{CallError, Client, TargetArgs};
 use super::dictionaries::Exported;
 use super::files::MeshFile;
 use super::progress::Progress;
-use super::query_inputs::{Input, gather};
+use super::query_inputs::{Input, Place, gather};
 use super::query_summary::Summary;
 use super::refused::Refused;
 use super::values::{at_least_one, one_of};
-use super::{CliError, api, dictionaries, output, query_text};
+use super::{CliError, dictionaries, output, query_text};
 use crate::http::dto::parameters::QueryRankByName;
 use crate::http::dto::query::VerdictDto;
+use crate::http::dto::shape::ReportDto;
 use serde_json::{Value, json};
 use shapelex_core::cancel::Cancel;
-use shapelex_core::mesh::{Limits, ReadContext, read_within};
+use shapelex_core::mesh::{
+    Format, Limits, MeshError, Pose, ReadContext, TriangleSoup, read_poses_within, read_within,
+};
 use shapelex_core::parameters::RankBy;
-use shapelex_core::pipeline::prepared::refined_to;
 use shapelex_core::pipeline::{RankedClass, describe_query, judge, judged_by, rank_top};
 use shapelex_core::ranking::JUDGED;
 use std::path::PathBuf;
@@ -25,8 +28,18 @@ use std::path::PathBuf;
 pub struct QueryArgs {
     /// Mesh files (OBJ, glTF, GLB, PLY, STL or OFF), folders of such, or - for standard input; subfolders of a folder
     /// name the classes of what is in them, and the answers are compared with them
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(required_unless_present = "shape", value_name = "FILE")]
     pub files: Vec<PathBuf>,
+    /// A shape of the index to query with, by its id or as CLASS/ID, as `shapes list` shows it; may be given several times.
+    /// The index was learnt from it, so its own class fits it better than a new shape
+    #[arg(long, value_name = "CLASS/ID", conflicts_with = "dictionaries")]
+    pub shape: Vec<String>,
+    /// Sample this many poses of every animated glTF and answer each; other files count once
+    #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
+    pub poses: Option<usize>,
+    /// Answer only this one of the poses, from 0
+    #[arg(long, value_name = "NUMBER", requires = "poses")]
+    pub pose: Option<usize>,
     /// What the mesh on standard input is called; an extension tells its format where its bytes do not
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
@@ -51,6 +64,24 @@ enum Source {
     File(Box<Exported>, RankBy),
 }
 
+impl QueryArgs {
+    fn question(&self) -> Result<Question, CliError> {
+        if let (Some(poses), Some(pose)) = (self.poses, self.pose)
+            && pose >= poses
+        {
+            return Err(CliError::Usage(format!(
+                "--pose {pose}: expected a number below --poses, which is {poses}; poses are counted from 0"
+            )));
+        }
+        Ok(Question {
+            top: Some(self.top),
+            rank_by: self.rank_by,
+            poses: self.poses,
+            pose: self.pose,
+        })
+    }
+}
+
 /// Ranks every mesh; goes on after one that is refused. With `--json` one line per mesh: the API's answer and the file's
 /// path. Of several meshes, and of a folder, a last line sums up.
 ///
@@ -58,24 +89,33 @@ enum Source {
 /// [`CliError::Usage`] where there is nothing to query, or nothing to query it against; [`CliError::Reported`] where a
 /// mesh was refused.
 pub fn run(args: &QueryArgs, json: bool) -> Result<(), CliError> {
-    let inputs = gather(&args.files, args.name.as_deref())?;
+    let question = args.question()?;
+    let mut inputs = gather(&args.files, args.name.as_deref())?;
+    inputs.extend(args.shape.iter().map(|shape| Input::stored(shape)));
     let source = source(args)?;
-    let several = inputs.len() > 1 || args.files.iter().any(|path| path.is_dir());
+    let several = inputs.len() > 1 || args.poses.is_some() || args.files.iter().any(|path| path.is_dir());
     let progress = Progress::at_terminal("query", inputs.len()).filter(|_| several);
     let mut summary = Summary::default();
     for input in &inputs {
-        let outcome = source.rank(input, args.top, args.rank_by);
+        let outcomes = source
+            .rank(input, &question)
+            .unwrap_or_else(|error| vec![Err(error)]);
         if let Some(progress) = &progress {
             progress.tick();
         }
-        Progress::suspended(progress.as_ref(), || tell(input, outcome, &mut summary, json))?;
+        Progress::suspended(progress.as_ref(), || {
+            outcomes
+                .into_iter()
+                .try_for_each(|outcome| tell(input, outcome, &mut summary, json))
+        })?;
     }
     if let Some(progress) = progress {
         progress.clear();
     }
-    if several && json {
+    let sums_up = summary.total > 1 || args.files.iter().any(|path| path.is_dir());
+    if sums_up && json {
         output::json(&summary.json())?;
-    } else if several {
+    } else if sums_up {
         output::line(&summary.text())?;
     }
     if summary.refused > 0 {
@@ -92,10 +132,14 @@ fn tell(
     summary: &mut Summary,
     json: bool,
 ) -> Result<(), CliError> {
+    let place = match input.place {
+        Place::File => "file",
+        Place::Stored => "shape",
+    };
     match outcome {
         Ok(mut answer) => {
             summary.add(&answer, input.class.as_deref());
-            answer["file"] = json!(input.path.display().to_string());
+            answer[place] = json!(input.path.display().to_string());
             if json {
                 query_text::warn_once(&mut answer);
                 output::json(&answer)
@@ -110,7 +154,7 @@ fn tell(
             let refusal = Refused::new(&input.path, error);
             refusal.warn();
             if json {
-                output::json(&json!({ "file": refusal.file, "error": refusal.reason, "code": code }))?;
+                output::json(&json!({ place: refusal.file, "error": refusal.reason, "code": code }))?;
             }
             Ok(())
         }
@@ -135,33 +179,123 @@ fn source(args: &QueryArgs) -> Result<Source, CliError> {
     Ok(Source::File(Box::new(exported), rank_by))
 }
 
+/// One answer or refusal per pose that was asked about.
+type Outcomes = Result<Vec<Result<Value, CliError>>, CliError>;
+
 impl Source {
-    fn rank(&self, input: &Input, top: usize, rank_by: Option<QueryRankByName>) -> Result<Value, CliError> {
+    fn rank(&self, input: &Input, question: &Question) -> Outcomes {
         let limits = Limits::default();
-        let file = input.load(limits.max_bytes)?;
-        let answer = match self {
-            Self::Service(client) => api::query(client, file, Some(top), rank_by.map(QueryRankByName::name))?,
-            Self::File(exported, rank_by) => rank_against(exported, &file, top, *rank_by, &limits)?,
+        let client = match self {
+            Self::Service(client) => client,
+            Self::File(exported, rank_by) => {
+                let file = input.load(limits.max_bytes)?;
+                return rank_against(exported, &file, question, *rank_by, &limits);
+            }
         };
-        Ok(answer)
+        // Files that are not animated count once.
+        let is_still = |outcomes: &Outcomes| {
+            let refused = |error: &CliError| error.code() == Some("no_animation");
+            question.pose.is_none() && outcomes.as_ref().is_err_and(refused)
+        };
+        let resting = Question {
+            poses: None,
+            ..*question
+        };
+        if input.place == Place::Stored {
+            let shape = input.path.to_string_lossy();
+            let asked = outcomes(question.stored(client, &shape));
+            return match is_still(&asked) {
+                true => outcomes(resting.stored(client, &shape)),
+                false => asked,
+            };
+        }
+        let file = input.load(limits.max_bytes)?;
+        if question.poses.is_none() {
+            return outcomes(question.file(client, file));
+        }
+        let asked = outcomes(question.file(client, file.clone()));
+        match is_still(&asked) {
+            true => outcomes(resting.file(client, file)),
+            false => asked,
+        }
     }
 }
 
-/// The same stages as the service's query, on an index that came out of a file. The answer has the members of the
+/// What a service answered; a file that could not be read is refused as a whole.
+fn outcomes(found: Result<Vec<Result<Value, CallError>>, CallError>) -> Outcomes {
+    let mut found: Vec<Result<Value, CliError>> = found?
+        .into_iter()
+        .map(|one| one.map_err(CliError::from))
+        .collect();
+    match (found.pop(), found.is_empty()) {
+        (Some(Err(error)), true) => Err(error),
+        (last, _) => {
+            found.extend(last);
+            Ok(found)
+        }
+    }
+}
+
+/// The meshes of a file that are asked about.
+fn soups(
+    file: &MeshFile,
+    question: &Question,
+    context: &ReadContext,
+) -> Result<(Format, Vec<(Value, TriangleSoup)>), CliError> {
+    let resting = || -> Result<_, CliError> {
+        let (format, soup) = read_within(&file.source(), context)?;
+        Ok((format, vec![(Value::Null, soup)]))
+    };
+    let Some(poses) = question.poses else {
+        return resting();
+    };
+    let (format, found) = match read_poses_within(&file.source(), poses, context) {
+        // Files that are not animated count once.
+        Err(MeshError::NoAnimation) if question.pose.is_none() => return resting(),
+        found => found?,
+    };
+    let of = found.len();
+    let meant = |(index, _): &(usize, Pose)| question.pose.is_none_or(|pose| pose == *index);
+    let found = found.into_iter().enumerate().filter(meant).map(|(index, pose)| {
+        let label = json!({ "label": pose.label, "index": index, "of": of });
+        (label, pose.soup)
+    });
+    Ok((format, found.collect()))
+}
+
+/// The same stages as the service's query, on an index that came out of a file. The answers have the members of the
 /// API's answer that have a meaning without a service.
 fn rank_against(
     exported: &Exported,
     file: &MeshFile,
-    top: usize,
+    question: &Question,
     rank_by: RankBy,
     limits: &Limits,
+) -> Outcomes {
+    let context = ReadContext::new(*limits);
+    let (format, soups) = soups(file, question, &context)?;
+    let top = question.top.unwrap_or(usize::MAX);
+    let ranked = soups.into_iter().map(|(pose, soup)| {
+        let mut answer = rank_soup(exported, soup, top, rank_by, &context.warnings.list())?;
+        answer["name"] = json!(file.name);
+        answer["pose"] = pose;
+        answer["format"] = json!(format);
+        Ok(answer)
+    });
+    Ok(ranked.collect())
+}
+
+fn rank_soup(
+    exported: &Exported,
+    soup: TriangleSoup,
+    top: usize,
+    rank_by: RankBy,
+    warnings: &[String],
 ) -> Result<Value, CliError> {
     let index = &exported.index;
     let cancel = Cancel::new();
-    let context = ReadContext::new(*limits);
-    let (format, soup) = read_within(&file.source(), &context)?;
     let mut description = describe_query(soup, &index.parameters, &cancel, &|_| ())?;
-    description.report.warnings.splice(0..0, context.warnings.list());
+    description.report.warnings.splice(0..0, warnings.iter().cloned());
     // The verdict is about the first few, however many are shown.
     let ranking = rank_top(&description.views, index, rank_by, top.max(JUDGED), &cancel)
         .map_err(shapelex_core::pipeline::PipelineError::from)?;
@@ -202,7 +336,6 @@ fn rank_against(
         })
         .collect();
     Ok(json!({
-        "name": file.name,
         "classes": classes,
         "verdict": VerdictDto::from(judged.verdict.clone()),
         "probability": judged.verdict.probability,
@@ -211,10 +344,8 @@ fn rank_against(
         "compared": ranking.compared,
         "pruned": ranking.pruned,
         "signatures": ranking.signatures,
-        "format": format,
         "warnings": description.report.warnings,
-        "mesh": description.report,
-        "refined_to": Some(refined_to(&description.report, &index.parameters)).filter(|&to| to > 0),
+        "mesh": ReportDto::from(description.report),
         "eigenvalues": description.eigenvalues,
         "rank_by": rank_by,
         "parameters": index.parameters,

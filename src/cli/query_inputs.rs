@@ -9,10 +9,21 @@ use std::path::{Path, PathBuf};
 /// The name of standard input on the command line.
 pub const STDIN: &str = "-";
 
+/// Where a mesh to be queried is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// In a file or on standard input.
+    File,
+    /// In the index: the path is a shape's id, or `CLASS/ID`.
+    Stored,
+}
+
 /// A mesh to be queried.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Input {
-    /// The file, or `-`.
+    /// Where it is.
+    pub place: Place,
+    /// The file, or `-`, or the stored shape.
     pub path: PathBuf,
     /// The class it belongs to, where it came from a subfolder of a folder.
     pub class: Option<String>,
@@ -45,12 +56,14 @@ pub fn gather(paths: &[PathBuf], name: Option<&str>) -> Result<Vec<Input>, CliEr
             .flatten();
         if path != Path::new(STDIN) && path.is_dir() {
             inputs.extend(found_files(path)?.into_iter().map(|file| Input {
+                place: Place::File,
                 path: file.path,
                 class: file.class,
                 name: None,
             }));
         } else {
             inputs.push(Input {
+                place: Place::File,
                 path: path.clone(),
                 class: None,
                 name: given,
@@ -61,6 +74,16 @@ pub fn gather(paths: &[PathBuf], name: Option<&str>) -> Result<Vec<Input>, CliEr
 }
 
 impl Input {
+    /// A stored shape, by its id or as `CLASS/ID`.
+    pub fn stored(shape: &str) -> Self {
+        Self {
+            place: Place::Stored,
+            path: PathBuf::from(shape),
+            class: None,
+            name: None,
+        }
+    }
+
     /// The mesh's bytes.
     ///
     /// # Errors

@@ -62,8 +62,16 @@ pub fn text(path: &Path, answer: &Value) -> String {
             cells
         })
         .collect();
+    let pose = match answer["pose"]["label"].as_str() {
+        Some(label) => format!(", pose {label}"),
+        None => String::new(),
+    };
+    let mesh = match answer["mesh"]["summary"].as_str() {
+        Some(summary) => format!("mesh: {summary}\n"),
+        None => String::new(),
+    };
     format!(
-        "{}: {}\n{}",
+        "{}{pose}: {}\n{mesh}{}",
         path.display(),
         verdict::sentence(answer),
         output::table(&header, &cells)
@@ -86,7 +94,7 @@ pub fn warn_once(answer: &mut Value) {
     }
 }
 
-/// The warnings of an answer and of its mesh's report. That a mesh was simplified is the rule and in the report.
+/// The warnings of an answer and of its mesh's report.
 fn warnings(answer: &Value) -> Vec<String> {
     let mut kept: Vec<String> = Vec::new();
     let both = [&answer["warnings"], &answer["mesh"]["warnings"]];
@@ -96,7 +104,7 @@ fn warnings(answer: &Value) -> Vec<String> {
         .flatten()
         .filter_map(Value::as_str)
     {
-        if !warning.starts_with("The mesh was simplified from ") && !kept.iter().any(|k| k == warning) {
+        if !kept.iter().any(|k| k == warning) {
             kept.push(warning.to_owned());
         }
     }
@@ -106,17 +114,40 @@ fn warnings(answer: &Value) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::http::dto::shape::ReportDto;
     use serde_json::json;
+    use shapelex_core::mesh::PrepareReport;
 
     #[test]
-    fn each_warning_is_said_once_and_the_usual_simplification_not_at_all() {
-        let simplified = "The mesh was simplified from 9000 to 2000 vertices.";
+    fn each_warning_is_said_once() {
         let mut answer = json!({
-            "warnings": [simplified, "The surface is open."],
-            "mesh": { "simplified_from": 9000, "warnings": [simplified, "The surface is open."] },
+            "warnings": ["The surface is open."],
+            "mesh": { "simplified_from": 9000, "warnings": ["The surface is open."] },
         });
         warn_once(&mut answer);
         assert_eq!(answer["warnings"], json!(["The surface is open."]));
         assert_eq!(answer["mesh"], json!({ "simplified_from": 9000 }));
+    }
+
+    #[test]
+    fn simplification_and_refinement_are_said_beside_the_verdict() {
+        let report = PrepareReport {
+            input_vertices: 9000,
+            input_faces: 18000,
+            simplified_from: Some(9000),
+            vertices: 800,
+            refined_to: Some(2500),
+            ..PrepareReport::default()
+        };
+        let answer = json!({ "verdict": { "text": "cat" }, "mesh": ReportDto::from(report), "classes": [] });
+        let said = text(Path::new("a.obj"), &answer);
+        let lines: Vec<&str> = said.lines().take(2).collect();
+        assert_eq!(
+            lines,
+            [
+                "a.obj: cat",
+                "mesh: 9000 vertices and 18000 faces, simplified to 800 vertices, refined to 2500 vertices for the spectrum"
+            ]
+        );
     }
 }

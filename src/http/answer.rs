@@ -3,13 +3,14 @@
 use super::admission::Work;
 use super::dto::class::ClassRef;
 use super::dto::query::{DetailsName, QueryAnswer, QueryOptions, RankedClass, RankedShape, SampledView};
+use super::dto::shape::PoseDto;
 use super::metrics;
 use super::problem::{Code, Problem};
 use super::problem_from::{baselines_missing, baselines_not_imported, index_empty};
 use super::ranked::Ranked;
 use super::state::Parts;
 use super::time_limit::{TimeView, rank_until};
-use super::uploaded::UploadedMesh;
+use super::uploaded::{ReadMesh, UploadedMesh};
 use crate::jobs::LiveIndex;
 use crate::model::{ClassId, Generation, Origin};
 use crate::store::StoreError;
@@ -55,7 +56,7 @@ pub fn answer(
         _ => problem,
     };
     let context = mesh.context(state.config.limits, stop);
-    let (format, soup) = mesh.read(&context).map_err(timely)?;
+    let ReadMesh { format, pose, soup } = mesh.read_posture(&context).map_err(timely)?;
     context
         .memory
         .grow(computing_bytes(&soup, &index, state.config.query_threads))?;
@@ -150,6 +151,7 @@ pub fn answer(
         });
     Ok(QueryAnswer {
         name: mesh.name.clone(),
+        pose: pose.map(PoseDto::from),
         classes: classes.collect(),
         nearest_shapes: shapes.collect(),
         probability: verdict.probability,

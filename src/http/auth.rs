@@ -35,8 +35,8 @@ pub fn access_of(operation: &str) -> Access {
         "list_classes" | "get_class" | "list_shapes" | "get_shape" | "get_original" | "list_jobs"
         | "get_job" | "follow_job" | "query_mesh" | "query_batch" | "get_index" | "get_parameters"
         | "get_metrics" => Access::Needs(Scope::Read),
-        "create_class" | "rename_class" | "delete_class" | "create_shapes" | "delete_shape"
-        | "start_reindex" | "cancel_job" => Access::Needs(Scope::Write),
+        "create_class" | "rename_class" | "delete_class" | "create_shapes" | "upload_dataset"
+        | "delete_shape" | "start_reindex" | "cancel_job" => Access::Needs(Scope::Write),
         _ => Access::Needs(Scope::Admin),
     }
 }

@@ -4,6 +4,7 @@
 //! and takes pieces for as long as there are any. So it is fed: little by little where the head of a part is due, and
 //! no more than a head may have; a piece after the other within a part, whose contents it hands on at once.
 
+use super::archive_path::safe_path;
 use super::arriving::Arriving;
 use super::body::{body_too_large, clean_name, essence, no_room};
 use super::problem::{Code, Problem};
@@ -156,6 +157,11 @@ async fn receive_part(
     broken: &impl Fn(MultipartError) -> Problem,
 ) -> Result<Part, Problem> {
     let name = clean_name(field.file_name().or(field.name()));
+    // Only where it lies among the other files of the form: nothing is ever opened under it.
+    let path = field
+        .file_name()
+        .filter(|name| name.contains(['/', '\\']))
+        .and_then(|name| safe_path(name).ok());
     let media_type = field.content_type().map(essence);
     let mut contents = Arriving::new(most, memory);
     while let Some(piece) = field.chunk().await.map_err(broken)? {
@@ -164,6 +170,7 @@ async fn receive_part(
     }
     Ok(Part {
         name,
+        path,
         media_type,
         bytes: contents.into_bytes(),
         packed: false,

@@ -4,7 +4,7 @@
 use super::auth::{Access, access_of, is_probe};
 use super::dto::problem::ProblemDocument;
 use super::problem::Code;
-use super::routes::{classes, docs, health, index, jobs, keys, query, shapes, snapshots};
+use super::routes::{classes, datasets, docs, health, index, jobs, keys, query, shapes, snapshots};
 use crate::model::ClassName;
 use axum::http::Method;
 use std::collections::BTreeMap;
@@ -38,6 +38,7 @@ use utoipa::{Modify, OpenApi};
     paths(
         classes::create_class, classes::list_classes, classes::get_class, classes::rename_class,
         classes::delete_class,
+        datasets::upload_dataset,
         shapes::create_shapes, shapes::list_shapes, shapes::get_shape, shapes::delete_shape, shapes::get_original,
         jobs::start_reindex, jobs::list_jobs, jobs::get_job, jobs::cancel_job, jobs::follow_job,
         query::query_mesh, query::query_batch,
@@ -241,6 +242,21 @@ fn problems_of(operation: &str) -> Vec<Code> {
             ],
         ]
         .concat(),
+        "upload_dataset" => [
+            UPLOAD,
+            MESH,
+            POOL,
+            WRITE,
+            &[
+                InvalidName,
+                FileWithoutClass,
+                UploadRejected,
+                NoAnimation,
+                QuotaExceeded,
+                ClassExists,
+            ],
+        ]
+        .concat(),
         "list_shapes" => vec![InvalidRequest, InvalidQuery, InvalidCursor, ClassNotFound],
         "get_shape" => vec![InvalidRequest, ClassNotFound, ShapeNotFound],
         "delete_shape" => [WRITE, &[InvalidRequest, ClassNotFound, ShapeNotFound]].concat(),
@@ -282,7 +298,9 @@ fn problems_of(operation: &str) -> Vec<Code> {
                 IndexIncomplete,
                 RecoveryMode,
                 RateLimited,
+                NoAnimation,
             ],
+            STORED,
         ]
         .concat(),
         "create_snapshot" => [WRITE, &[SnapshotRunning]].concat(),
@@ -301,7 +319,12 @@ fn problems_of(operation: &str) -> Vec<Code> {
             ],
         ]
         .concat(),
-        "query_batch" => [UPLOAD, &[IndexEmpty, RecoveryMode, RateLimited]].concat(),
+        "query_batch" => [
+            UPLOAD,
+            STORED,
+            &[IndexEmpty, RecoveryMode, RateLimited, OneMeshExpected],
+        ]
+        .concat(),
         _ => vec![],
     };
     if access_of(operation) != Access::Public {
@@ -361,6 +384,14 @@ const MESH: &[Code] = &[
     Code::MeshTooLarge,
     Code::InvalidMesh,
     Code::SpectrumFailed,
+];
+/// Of a stored shape as a query.
+const STORED: &[Code] = &[
+    Code::ClassNotFound,
+    Code::ShapeNotFound,
+    Code::OriginalMissing,
+    Code::OriginalDamaged,
+    Code::StorageDenied,
 ];
 const POOL: &[Code] = &[
     Code::Overloaded,

@@ -68,6 +68,7 @@ codes! {
     NestedArchive, "nested_archive", 422, "The archive holds another archive";
     ArchiveTooLarge, "archive_too_large", 413, "The archive unpacks to more than the limit";
     UploadRejected, "upload_rejected", 422, "At least one file could not be used; nothing was stored";
+    FileWithoutClass, "file_without_class", 422, "The file lies in no folder that names its class";
     // --- meshes ---
     EmptyBody, "empty_body", 400, "The body is empty";
     UnknownFormat, "unknown_format", 415, "The mesh format was not recognised";

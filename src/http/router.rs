@@ -3,7 +3,7 @@
 use super::auth::API_KEY;
 use super::compression;
 use super::respond::{REQUEST_ID, around, panicked, route_not_found};
-use super::routes::{classes, docs, health, index, jobs, keys, query, shapes, snapshots};
+use super::routes::{classes, datasets, docs, health, index, jobs, keys, query, shapes, snapshots};
 use super::state::AppState;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -40,6 +40,7 @@ pub fn router(state: AppState) -> Router {
             "/v1/classes/{class}/shapes/{shape}/original",
             get(shapes::get_original),
         )
+        .route("/v1/shapes", post(datasets::upload_dataset))
         .route("/v1/reindex", post(jobs::start_reindex))
         .route("/v1/jobs", get(jobs::list_jobs))
         .route("/v1/jobs/{job}", get(jobs::get_job))

@@ -9,7 +9,7 @@ use super::config::UploadLimits;
 use super::multipart::receive_multipart;
 use super::problem::{Code, Problem};
 use super::request_memory;
-use super::uploaded::{Part, UploadedMesh};
+use super::uploaded::{Buffers, Part, Posture, UploadedMesh};
 use crate::model::text::is_hidden;
 use axum::extract::Request;
 use axum::http::{HeaderMap, header};
@@ -148,6 +148,7 @@ async fn receive_raw(
     }
     Ok(Part {
         name: clean_name(name.as_deref()),
+        path: None,
         media_type: declared,
         bytes: body.into_bytes(),
         packed: false,
@@ -178,6 +179,7 @@ fn sort(
             archive_limits.max_bytes = archive_limits.max_bytes.saturating_sub(member.bytes.len());
             files.push(Part {
                 name: member.path,
+                path: None,
                 media_type: None,
                 bytes: member.bytes.into(),
                 packed: true,
@@ -208,9 +210,12 @@ fn sort(
         .into_iter()
         .map(|file| UploadedMesh {
             name: file.name.replace(is_hidden, ""),
+            folder: file.folder().to_owned(),
             media_type: file.media_type.filter(|t| Format::from_media_type(t).is_some()),
             bytes: file.bytes,
-            buffers: buffers.clone(),
+            member: file.packed.then_some(file.name),
+            buffers: Buffers::Sent(buffers.clone()),
+            posture: Posture::Resting,
             memory: memory.clone(),
         })
         .collect();

@@ -1,6 +1,7 @@
-//! A mesh as it was sent, and the buffers a glTF finds beside it.
+//! A mesh file as it was sent or stored, and the buffers a glTF finds beside it.
 
-use super::problem::Problem;
+use super::problem::{Code, Problem};
+use crate::model::ShapePose;
 use bytes::Bytes;
 use shapelex_core::cancel::Cancel;
 use shapelex_core::memory::Reservation;
@@ -13,6 +14,8 @@ use std::sync::Arc;
 pub(super) struct Part {
     /// Its name, with folders only where it came out of an archive.
     pub name: String,
+    /// Its path within the request, where a form gave it one: buffers are told apart by it.
+    pub path: Option<String>,
     /// The declared media type.
     pub media_type: Option<String>,
     /// Its contents.
@@ -21,7 +24,54 @@ pub(super) struct Part {
     pub packed: bool,
 }
 
-/// A mesh file that was sent, with the buffers that came along.
+impl Part {
+    /// Where it lies among the files of the request.
+    pub(super) fn place(&self) -> &str {
+        self.path.as_deref().unwrap_or(&self.name)
+    }
+
+    /// The folder it lies in, empty at the top.
+    pub(super) fn folder(&self) -> &str {
+        self.place().rsplit_once('/').map_or("", |(folder, _)| folder)
+    }
+}
+
+/// The files a glTF may refer to.
+#[derive(Clone, Debug)]
+pub(super) enum Buffers {
+    /// All buffers of the request, to be searched by name.
+    Sent(Arc<Vec<Part>>),
+    /// Those of a stored shape, under the names the glTF uses.
+    Stored(Vec<Companion>),
+}
+
+/// Which pose of a file is meant.
+#[derive(Clone, Debug)]
+pub(super) enum Posture {
+    /// The file as it is: its resting pose.
+    Resting,
+    /// One of the poses that are sampled from its animations.
+    Sampled {
+        /// Which, from 0.
+        index: usize,
+        /// How many are sampled.
+        of: usize,
+    },
+    /// A pose that was read already, together with the others of its file.
+    Read(Arc<ReadPose>),
+}
+
+/// A pose in memory, where the poses of one file are ranked one after the other.
+#[derive(Debug)]
+pub(super) struct ReadPose {
+    format: Format,
+    pose: ShapePose,
+    soup: TriangleSoup,
+    /// Memory of the soup.
+    _memory: Reservation,
+}
+
+/// A mesh file that was sent or stored, with its buffers.
 #[derive(Clone, Debug)]
 pub struct UploadedMesh {
     /// Its name, or `mesh` where it was sent without one.
@@ -30,9 +80,23 @@ pub struct UploadedMesh {
     pub media_type: Option<String>,
     /// Its contents.
     pub bytes: Bytes,
-    pub(super) buffers: Arc<Vec<Part>>,
+    /// Its path in the archive it came out of, every character kept.
+    pub(super) member: Option<String>,
+    /// The folder among the files of the request from which its buffers are searched.
+    pub(super) folder: String,
+    pub(super) buffers: Buffers,
+    pub(super) posture: Posture,
     /// The memory of the request it came with.
     pub(super) memory: Arc<Reservation>,
+}
+
+/// A mesh that was read.
+#[derive(Debug)]
+pub(super) struct ReadMesh {
+    pub(super) format: Format,
+    /// Which pose of the file it is, where poses were asked for.
+    pub(super) pose: Option<ShapePose>,
+    pub(super) soup: TriangleSoup,
 }
 
 /// Bytes held per byte of the file while it is read, beside what the reader reserves for its arrays: small buffers and
@@ -68,6 +132,79 @@ impl UploadedMesh {
         (self.bytes.len() as u64).saturating_mul(READING_FACTOR)
     }
 
+    /// Reads the mesh that is meant, which stays reserved: the file, or one pose of it.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read); `no_animation`; `invalid_query` where the file gives fewer poses than the index asks for.
+    pub(super) fn read_posture(&self, context: &ReadContext) -> Result<ReadMesh, Problem> {
+        let (format, pose, soup) = match &self.posture {
+            Posture::Resting => {
+                let (format, soup) = self.read(context)?;
+                (format, None, soup)
+            }
+            Posture::Sampled { index, of } => {
+                let (format, mut poses) = self.read_poses(*of, context)?;
+                let all: u64 = poses.iter().map(|pose| soup_bytes(&pose.soup)).sum();
+                let of = poses.len();
+                if *index >= of {
+                    return Err(no_such_pose(*index, of));
+                }
+                let found = poses.swap_remove(*index);
+                drop(poses);
+                context.memory.shrink(all - soup_bytes(&found.soup));
+                let pose = shape_pose(found.label, *index, of);
+                (format, Some(pose), found.soup)
+            }
+            Posture::Read(read) => {
+                context.memory.grow(soup_bytes(&read.soup))?;
+                (read.format, Some(read.pose.clone()), read.soup.clone())
+            }
+        };
+        Ok(ReadMesh { format, pose, soup })
+    }
+
+    /// The mesh once per pose. The poses are read now, so that a file is read once however many of its poses are ranked.
+    ///
+    /// # Errors
+    /// As [`read_poses`](Self::read_poses).
+    pub(super) fn in_poses(
+        &self,
+        poses: usize,
+        limits: Limits,
+        cancel: &Cancel,
+    ) -> Result<Vec<Self>, Problem> {
+        let context = self.context(limits, cancel);
+        let (format, found) = self.read_poses(poses, &context)?;
+        let of = found.len();
+        found
+            .into_iter()
+            .enumerate()
+            .map(|(index, found)| {
+                let memory = self.memory.step();
+                memory.grow(soup_bytes(&found.soup))?;
+                context.memory.shrink(soup_bytes(&found.soup));
+                let read = ReadPose {
+                    format,
+                    pose: shape_pose(found.label, index, of),
+                    soup: found.soup,
+                    _memory: memory,
+                };
+                Ok(Self {
+                    posture: Posture::Read(Arc::new(read)),
+                    ..self.clone()
+                })
+            })
+            .collect()
+    }
+
+    /// Which pose of its file this is, as far as that is known before it is read.
+    pub(super) fn pose(&self) -> Option<&ShapePose> {
+        match &self.posture {
+            Posture::Read(read) => Some(&read.pose),
+            Posture::Resting | Posture::Sampled { .. } => None,
+        }
+    }
+
     /// Samples poses of an animated glTF.
     ///
     /// # Errors
@@ -98,18 +235,32 @@ impl UploadedMesh {
     /// A buffer is looked for from the mesh's own folder or, since browsers send names without folders, by its last
     /// part alone.
     pub fn companions(&self) -> Vec<Companion> {
-        if self.buffers.is_empty() {
-            return Vec::new();
-        }
-        let folder = self.name.rsplit_once('/').map_or("", |(folder, _)| folder);
+        let buffers = match &self.buffers {
+            Buffers::Stored(companions) => return companions.clone(),
+            Buffers::Sent(buffers) if buffers.is_empty() => return Vec::new(),
+            Buffers::Sent(buffers) => buffers,
+        };
         external_buffers(&self.bytes)
             .into_iter()
             .filter_map(|uri| {
-                let part = uri.find(folder, &self.buffers, |part| &part.name, |part| !part.packed)?;
+                let part = uri.find(&self.folder, buffers, Part::place, |part| !part.packed)?;
                 Some(Companion::new(uri.path(), part.bytes.clone()))
             })
             .collect()
     }
+}
+
+fn shape_pose(label: String, index: usize, of: usize) -> ShapePose {
+    ShapePose { label, index, of }
+}
+
+fn no_such_pose(index: usize, found: usize) -> Problem {
+    Problem::new(
+        Code::InvalidQuery,
+        format!("pose must be below {found}, the number of poses the file gives; got {index}"),
+    )
+    .with("name", "pose")
+    .with("poses", found)
 }
 
 /// Memory of a mesh as read, in bytes.

@@ -241,7 +241,7 @@ impl Store {
     }
 
     /// Stores the files of the shapes and makes their records. Files of equal address in memory are hashed once.
-    fn write_files(
+    pub(super) fn write_files(
         &self,
         class: ClassId,
         shapes: &[NewShape],
@@ -288,7 +288,11 @@ impl Store {
     }
 
     /// Which of the candidates are new and which the class has already; equal candidates are one shape.
-    fn told_apart(&self, class: ClassId, candidates: Vec<Shape>) -> Result<Vec<AddedShape>, StoreError> {
+    pub(super) fn told_apart(
+        &self,
+        class: ClassId,
+        candidates: Vec<Shape>,
+    ) -> Result<Vec<AddedShape>, StoreError> {
         let mut fresh: BTreeMap<ContentHash, Shape> = BTreeMap::new();
         let mut added = Vec::with_capacity(candidates.len());
         for shape in candidates {
@@ -402,7 +406,7 @@ impl Store {
 }
 
 /// The shapes that are new.
-fn fresh(added: &[AddedShape]) -> Vec<Shape> {
+pub(super) fn fresh(added: &[AddedShape]) -> Vec<Shape> {
     added
         .iter()
         .filter(|a| a.created)

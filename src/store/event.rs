@@ -71,6 +71,8 @@ pub enum Event {
     KeyCreated { key: ApiKey },
     /// An API key stopped working.
     KeyRevoked { id: KeyId },
+    /// Several changes at once, each of another class: all of them happened.
+    Several { events: Vec<Event> },
 }
 
 pub(super) fn get<R: Record>(backend: &dyn Backend, key: &[u8]) -> Result<Option<R>, StoreError> {
@@ -231,6 +233,11 @@ pub(super) fn stage(backend: &dyn Backend, event: &Event) -> Result<Batch, Store
         }
         Event::KeyCreated { key } => put(&mut batch, keys::api_key(key.id), key)?,
         Event::KeyRevoked { id } => batch.delete(keys::api_key(*id)),
+        Event::Several { events } => {
+            for event in events {
+                batch.writes.extend(stage(backend, event)?.writes);
+            }
+        }
     }
     Ok(batch)
 }

@@ -1,5 +1,7 @@
 //! The house's rules, as tests: who may use whom, and how long a file may be.
 
+mod documents;
+
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 

@@ -108,3 +108,53 @@ fn instances_are_warned_of() {
     let shown = stderr(&run(dir.path(), &["inspect", "instanced.gltf"]));
     assert!(shown.contains("one copy of each was read"), "{shown}");
 }
+
+#[test]
+fn stored_shapes_and_poses_are_queried() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path();
+    crate::small_zoo(path);
+    answer(path, &["index", "shapes", "--preset", "fast"]);
+    let classes = last_json(&answer(path, &["classes", "list", "--json"]));
+    let class = classes["name"].as_str().unwrap();
+    let shape = last_json(&answer(path, &["shapes", "list", class, "--json"]));
+    let id = shape["id"].as_str().unwrap();
+    let named = format!("{class}/{id}");
+    let stored = last_json(&answer(path, &["query", "--shape", &named, "--json"]));
+    assert_eq!(stored["shape"], named);
+    assert_eq!(stored["classes"][0]["class"]["name"], class);
+    let both = answer(path, &["query", "--shape", id, "--shape", &named]);
+    assert!(both.contains("2 of 2 meshes answered"), "{both}");
+    assert!(both.contains("\nmesh: "), "{both}");
+    let missing = run(path, &["query", "--shape", "nowhere/x"]);
+    assert_eq!(missing.status.code(), Some(1));
+    assert!(
+        stderr(&missing).contains("no class 'nowhere'"),
+        "{}",
+        stderr(&missing)
+    );
+
+    // A file without animation counts once, with an index and with a file of dictionaries.
+    let file = std::fs::read_dir(path.join("shapes").join(class)).unwrap().next();
+    let file = file.unwrap().unwrap().path();
+    let file = file.to_str().unwrap();
+    answer(path, &["export", "--out", "d.safetensors"]);
+    for from in [&["--data", "shapelex-data"], &["--dictionaries", "d.safetensors"]] {
+        let asked = [&["query", file, "--poses", "3", "--json"][..], from].concat();
+        let still = answer(path, &asked);
+        assert_eq!(still.lines().count(), 1, "{still}");
+        assert!(last_json(&still)["pose"].is_null(), "{still}");
+        let one = [&["query", file, "--poses", "3", "--pose", "1"][..], from].concat();
+        assert_eq!(run(path, &one).status.code(), Some(1));
+    }
+    for wrong in [
+        &["query", file, "--pose", "1"][..],
+        &["query", file, "--poses", "0"],
+        &["query", file, "--poses", "2", "--pose", "2"],
+        &["query", "--shape", id, "--dictionaries", "d.safetensors"],
+        &["query"],
+    ] {
+        let refused = run(path, wrong);
+        assert_eq!(refused.status.code(), Some(2), "{wrong:?}: {}", stderr(&refused));
+    }
+}

@@ -1,5 +1,6 @@
 //! `--server https://…`: a service behind TLS, trusted by a certificate of one's own.
 
+use crate::service::Service;
 use crate::{run, stderr};
 use rcgen::{CertifiedKey, generate_simple_self_signed};
 use rustls::pki_types::{PrivateKeyDer, PrivatePkcs8KeyDer};
@@ -8,10 +9,11 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;
 use std::sync::Arc;
 
-/// Answers every request over TLS with `{"status":"ok"}`; gives its address and its certificate as PEM.
-fn secure_service() -> (String, String) {
-    let CertifiedKey { cert, signing_key } =
-        generate_simple_self_signed(["localhost".to_owned(), "127.0.0.1".to_owned()]).unwrap();
+/// Answers every request over TLS as a service that is alive and has empty lists; gives its address and its certificate,
+/// which is for `names`, as PEM.
+fn secure_service(names: &[&str]) -> (String, String) {
+    let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+    let CertifiedKey { cert, signing_key } = generate_simple_self_signed(names).unwrap();
     let key = PrivateKeyDer::Pkcs8(PrivatePkcs8KeyDer::from(signing_key.serialize_der()));
     let config = ServerConfig::builder_with_provider(Arc::new(rustls::crypto::ring::default_provider()))
         .with_safe_default_protocol_versions()
@@ -31,7 +33,7 @@ fn secure_service() -> (String, String) {
             while stream.read_line(&mut line).is_ok_and(|n| n > 2) {
                 line.clear();
             }
-            let body = "{\"status\":\"ok\"}";
+            let body = "{\"status\":\"ok\",\"items\":[],\"next_cursor\":null}";
             let _ = write!(
                 stream.get_mut(),
                 "HTTP/1.1 200 OK\r\ncontent-length: {}\r\nconnection: close\r\n\r\n{body}",
@@ -46,7 +48,7 @@ fn secure_service() -> (String, String) {
 #[test]
 fn a_service_behind_tls_is_trusted_by_its_own_certificate_only() {
     let dir = tempfile::tempdir().unwrap();
-    let (url, pem) = secure_service();
+    let (url, pem) = secure_service(&["localhost", "127.0.0.1"]);
     std::fs::write(dir.path().join("ca.pem"), pem).unwrap();
     let trusted = run(dir.path(), &["health", "--server", &url, "--ca-cert", "ca.pem"]);
     assert!(trusted.status.success(), "{}", stderr(&trusted));
@@ -60,4 +62,23 @@ fn a_service_behind_tls_is_trusted_by_its_own_certificate_only() {
         assert_eq!(wrong.status.code(), Some(2), "{}", stderr(&wrong));
         assert!(stderr(&wrong).contains(file), "{}", stderr(&wrong));
     }
+}
+
+#[test]
+fn the_service_on_a_data_directory_is_reached_whatever_its_certificate_names() {
+    let dir = tempfile::tempdir().unwrap();
+    let service = Service::start(dir.path(), &["--data", "d"]);
+    let (url, _) = secure_service(&["shapes.example"]);
+    // What a service that speaks TLS writes.
+    let access = serde_json::json!({ "url": url, "token": "slt_x" });
+    std::fs::write(dir.path().join("d/local-access.json"), access.to_string()).unwrap();
+    for command in ["keys", "snapshot"] {
+        let listed = run(dir.path(), &[command, "list", "--data", "d"]);
+        assert!(listed.status.success(), "{command}: {}", stderr(&listed));
+        assert!(stderr(&listed).contains(&url), "{}", stderr(&listed));
+    }
+    // An address that is named is checked as ever.
+    let named = run(dir.path(), &["keys", "list", "--server", &url]);
+    assert_eq!(named.status.code(), Some(1));
+    assert!(service.terminate().success());
 }

@@ -114,6 +114,36 @@ async fn one_file_under_many_names_is_kept_once() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn buffers_of_one_name_in_different_folders_are_told_apart() {
+    let app = App::new();
+    let (document, buffer) = mesh("bean", 0).gltf("positions/data.bin");
+    let mut document: Value = serde_json::from_slice(&document).unwrap();
+    let middle = document["bufferViews"][0]["byteLength"].as_u64().unwrap() as usize;
+    let (positions, indices) = buffer.split_at(middle);
+    document["buffers"] = json!([
+        {"byteLength": positions.len(), "uri": "positions/data.bin"},
+        {"byteLength": indices.len(), "uri": "./indices/data.bin"},
+    ]);
+    document["bufferViews"][1]["buffer"] = json!(1);
+    document["bufferViews"][1]["byteOffset"] = json!(0);
+    let document = document.to_string();
+    for (mesh, folder) in [("a.gltf", ""), ("set/a.gltf", "set/"), ("a.gltf", "./")] {
+        let first = format!("{folder}positions/data.bin");
+        let second = format!("{folder}indices\\data.bin");
+        let files: [(&str, &[u8]); 3] = [
+            (&second, indices),
+            (mesh, document.as_bytes()),
+            (&first, positions),
+        ];
+        let (media_type, body) = multipart(&files);
+        assert_eq!(
+            companions(&app, folder, &media_type, body).await,
+            ["indices/data.bin", "positions/data.bin"]
+        );
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn instances_are_warned_of() {
     let app = App::indexed().await;
     let glb = mesh("bean", 0).glb();

@@ -176,18 +176,48 @@ impl Mesh {
     }
 
     pub fn glb(&self) -> Vec<u8> {
-        let mut json = self.document(None).into_bytes();
-        json.resize(json.len().next_multiple_of(4), b' ');
-        let buffer = self.buffer();
-        let mut bytes = b"glTF".to_vec();
-        bytes.extend(2u32.to_le_bytes());
-        bytes.extend((12 + 8 + json.len() as u32 + 8 + buffer.len() as u32).to_le_bytes());
-        bytes.extend((json.len() as u32).to_le_bytes());
-        bytes.extend(b"JSON");
-        bytes.extend(json);
-        bytes.extend((buffer.len() as u32).to_le_bytes());
-        bytes.extend(b"BIN\0");
-        bytes.extend(buffer);
-        bytes
+        pack_glb(self.document(None), &self.buffer())
     }
+
+    /// A GLB with one clip, `Stretch`, that makes the mesh three times as long.
+    pub fn animated(&self) -> Vec<u8> {
+        let mut buffer = self.buffer();
+        let start = buffer.len();
+        for value in [0.0_f32, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 3.0] {
+            buffer.extend(value.to_le_bytes());
+        }
+        let mut document: serde_json::Value = serde_json::from_str(&self.document(None)).unwrap();
+        document["buffers"][0]["byteLength"] = buffer.len().into();
+        let views = document["bufferViews"].as_array_mut().unwrap();
+        for (offset, length) in [(start, 8), (start + 8, 24)] {
+            views.push(serde_json::json!({"buffer": 0, "byteOffset": offset, "byteLength": length}));
+        }
+        let accessors = document["accessors"].as_array_mut().unwrap();
+        accessors.push(serde_json::json!({
+            "bufferView": 2, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0.0], "max": [1.0]
+        }));
+        accessors
+            .push(serde_json::json!({"bufferView": 3, "componentType": 5126, "count": 2, "type": "VEC3"}));
+        document["animations"] = serde_json::json!([{
+            "name": "Stretch",
+            "samplers": [{"input": 2, "output": 3}],
+            "channels": [{"sampler": 0, "target": {"node": 0, "path": "scale"}}]
+        }]);
+        pack_glb(document.to_string(), &buffer)
+    }
+}
+
+fn pack_glb(document: String, buffer: &[u8]) -> Vec<u8> {
+    let mut json = document.into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut bytes = b"glTF".to_vec();
+    bytes.extend(2u32.to_le_bytes());
+    bytes.extend((12 + 8 + json.len() as u32 + 8 + buffer.len() as u32).to_le_bytes());
+    bytes.extend((json.len() as u32).to_le_bytes());
+    bytes.extend(b"JSON");
+    bytes.extend(json);
+    bytes.extend((buffer.len() as u32).to_le_bytes());
+    bytes.extend(b"BIN\0");
+    bytes.extend(buffer);
+    bytes
 }

@@ -1,6 +1,7 @@
 //! The store and the job queue: durability, recovery, faults at every write, and the indexing worker.
 
 mod catalogue;
+mod datasets;
 mod faults;
 mod formats;
 mod imports;

@@ -2,6 +2,7 @@
 //! change with the API's version. Types that come in refuse fields they do not know.
 
 pub mod class;
+pub mod dataset;
 pub mod index;
 pub mod job;
 pub mod key;

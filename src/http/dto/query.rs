@@ -2,7 +2,7 @@
 
 use super::class::ClassRef;
 use super::parameters::{HypothesisName, ParametersDto, QueryRankByName};
-use super::shape::ReportDto;
+use super::shape::{PoseDto, ReportDto};
 use serde::{Deserialize, Serialize};
 use shapelex_core::ranking::{Verdict, VerdictKind};
 use std::collections::BTreeMap;
@@ -24,6 +24,16 @@ pub struct QueryOptions {
     pub rank_by: Option<QueryRankByName>,
     /// What a raw body is called, such as `dog0.obj`.
     pub name: Option<String>,
+    /// A stored shape to query with, instead of a body: its id, or `CLASS/ID` with the class's id or name, which has to be
+    /// its class then. A shape that was sampled as a pose is queried in this pose.
+    pub shape: Option<String>,
+    /// Sample this many poses of every animated glTF instead of reading its resting pose. A batch answers each; a single
+    /// query needs `pose` too, where there is more than one.
+    #[param(minimum = 1, maximum = 64)]
+    pub poses: Option<usize>,
+    /// Which of the sampled `poses` is meant, from 0.
+    #[param(minimum = 0, maximum = 63)]
+    pub pose: Option<usize>,
     /// Milliseconds from the arrival of the mesh after which the best ranking so far is answered, marked `partial`.
     /// Where not even one class was scored by then, the query fails with `deadline_exceeded`.
     #[param(minimum = 1)]
@@ -153,6 +163,8 @@ pub struct RankedShape {
 pub struct QueryAnswer {
     /// The mesh's name.
     pub name: String,
+    /// Which pose of an animated file was queried; `null` for the file as it is.
+    pub pose: Option<PoseDto>,
     /// What the answer says, for people.
     pub verdict: VerdictDto,
     /// Classes, best first.
@@ -232,6 +244,9 @@ pub enum BatchLine {
         index: usize,
         /// Its name.
         name: String,
+        /// Which pose of an animated file; left out where the file as a whole failed.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pose: Option<PoseDto>,
         /// Why.
         #[schema(value_type = super::problem::ProblemDocument)]
         problem: serde_json::Value,
@@ -246,7 +261,7 @@ pub enum BatchLine {
 /// How a batch went.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ToSchema)]
 pub struct BatchSummary {
-    /// Meshes in the batch.
+    /// Meshes in the batch; each pose counts where poses were asked for.
     pub total: usize,
     /// Meshes that were answered.
     pub ok: usize,

@@ -2,7 +2,7 @@
 
 use super::class::ClassDto;
 use super::time;
-use crate::model::Shape;
+use crate::model::{Shape, ShapePose};
 use crate::store::AddedShape;
 use serde::{Deserialize, Serialize};
 use shapelex_core::mesh::PrepareReport;
@@ -25,6 +25,8 @@ pub struct UploadQuery {
 /// What preparing did to a mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct ReportDto {
+    /// The sizes as read, after cleaning or simplification, and after refinement, ready to be shown.
+    pub summary: String,
     /// Vertices as read.
     pub input_vertices: usize,
     /// Faces as read.
@@ -74,6 +76,7 @@ pub struct ReportDto {
 impl From<PrepareReport> for ReportDto {
     fn from(report: PrepareReport) -> Self {
         Self {
+            summary: summary(&report),
             input_vertices: report.input_vertices,
             input_faces: report.input_faces,
             welded_vertices: report.welded_vertices,
@@ -99,6 +102,23 @@ impl From<PrepareReport> for ReportDto {
     }
 }
 
+/// What was read, and the normal steps that changed its size.
+fn summary(report: &PrepareReport) -> String {
+    let mut text = format!(
+        "{} vertices and {} faces",
+        report.input_vertices, report.input_faces
+    );
+    if report.simplified_from.is_some() {
+        text += &format!(", simplified to {} vertices", report.vertices);
+    } else if report.vertices != report.input_vertices {
+        text += &format!(", cleaned to {} vertices", report.vertices);
+    }
+    if let Some(to) = report.refined_to {
+        text += &format!(", refined to {to} vertices for the spectrum");
+    }
+    text
+}
+
 /// Which pose of an animated file a shape is.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, ToSchema)]
 pub struct PoseDto {
@@ -108,6 +128,16 @@ pub struct PoseDto {
     pub index: usize,
     /// How many poses were sampled from the file.
     pub of: usize,
+}
+
+impl From<ShapePose> for PoseDto {
+    fn from(pose: ShapePose) -> Self {
+        Self {
+            label: pose.label,
+            index: pose.index,
+            of: pose.of,
+        }
+    }
 }
 
 /// A file that was sent with a shape and belongs to it.
@@ -164,11 +194,7 @@ impl From<Shape> for ShapeDto {
                     hash: c.content.to_string(),
                 })
                 .collect(),
-            pose: shape.pose.map(|pose| PoseDto {
-                label: pose.label,
-                index: pose.index,
-                of: pose.of,
-            }),
+            pose: shape.pose.map(Into::into),
             report: shape.report.into(),
             original: format!("/v1/classes/{}/shapes/{}/original", shape.class, shape.id),
             created_at: time(shape.created_at),

@@ -4,35 +4,34 @@ use crate::http::AppState;
 use crate::http::admission::Patience;
 use crate::http::answer::answer;
 use crate::http::auth::Caller;
-use crate::http::dto::query::{BatchLine, BatchSummary, QueryAnswer, QueryOptions};
+use crate::http::batch::Batch;
+use crate::http::dto::query::{BatchLine, QueryAnswer, QueryOptions};
 use crate::http::dto::{Binary, FilesForm};
 use crate::http::extract::ApiQuery;
 use crate::http::limits::Allowance;
+use crate::http::poses::Poses;
 use crate::http::problem::{Code, Problem};
 use crate::http::problem_from::index_empty;
 use crate::http::time_limit::TimeLimit;
 use crate::http::upload::{self, Upload};
 use crate::http::uploaded::UploadedMesh;
-use crate::http::{metrics, respond};
+use crate::http::{respond, stored};
 use crate::jobs::LiveIndex;
 use axum::Json;
-use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
-use bytes::Bytes;
-use futures_util::{StreamExt, stream};
-use std::convert::Infallible;
 use std::sync::Arc;
 use std::time::Duration;
 
 /// Query with a mesh
 ///
 /// Ranks all classes by how well each regenerates the mesh's signatures. The mesh is the body, or the one mesh of a
-/// `multipart/form-data` with its buffers, or of an archive.
+/// `multipart/form-data` with its buffers, or of an archive; with `shape` it is a stored shape, and the request has no
+/// body. With `poses` and `pose` it is a pose of an animated glTF.
 #[utoipa::path(
     post, path = "/v1/query", tag = "query", params(QueryOptions),
-    request_body(description = "One mesh", content(
+    request_body(description = "One mesh; nothing where `shape` names one", content(
         (Binary = "application/octet-stream"),
         (Binary = "model/obj"),
         (Binary = "model/gltf+json"),
@@ -53,8 +52,9 @@ pub async fn query_mesh(
     caller: Caller,
     request: Request,
 ) -> Result<Response, Problem> {
+    let poses = poses_of(&state, &options)?;
     let (live, upload, left) = begin(&state, &caller, &options, request).await?;
-    let mesh = upload::only_mesh(upload)?;
+    let mesh = poses.only(upload::only_mesh(upload)?)?;
     let answer = rank(&state, Patience::Bounded, live, mesh, options).await?;
     let mut response = Json(answer).into_response();
     if let Some(left) = left {
@@ -67,10 +67,11 @@ pub async fn query_mesh(
 ///
 /// Answers a line of JSON per mesh, in the order they are finished, and a last line with the counts. A mesh that could
 /// not be answered has `"status": "failed"` and its problem; that is never the same as an answer without a match. A
-/// stream without the last line was cut short.
+/// stream without the last line was cut short. With `poses` there is a line per pose of each mesh; `index` is the
+/// mesh's, `pose` tells them apart.
 #[utoipa::path(
     post, path = "/v1/query/batch", tag = "query", params(QueryOptions),
-    request_body(description = "Meshes", content(
+    request_body(description = "Meshes; nothing where `shape` names one", content(
         (FilesForm = "multipart/form-data"),
         (Binary = "application/zip"),
         (Binary = "application/x-tar"),
@@ -86,78 +87,29 @@ pub async fn query_batch(
     request: Request,
 ) -> Result<Response, Problem> {
     let id = respond::id_of(&request);
+    let poses = poses_of(&state, &options)?;
     let (live, upload, mut left) = begin(&state, &caller, &options, request).await?;
-    let total = upload.meshes.len();
+    let total = upload.meshes.len() * poses.per_file();
     if total > 1 {
         left = state.limits.take_queries(&caller, total - 1)?;
     }
-    let threads = state.config.query_threads.max(1);
-    let stopping = state.stopping.clone();
-    let lines = stream::iter(upload.meshes.into_iter().enumerate())
-        .map(move |(index, mesh)| {
-            let (state, live, options) = (state.clone(), live.clone(), options.clone());
-            async move {
-                let name = mesh.name.clone();
-                let answer = rank(&state, Patience::Batch, live, mesh, options).await;
-                (index, name, answer)
-            }
-        })
-        .buffer_unordered(threads)
-        .take_until(stopping.cancelled_owned());
-    let body = stream::unfold(
-        (Box::pin(lines), BatchSummary::default(), false),
-        move |(mut lines, mut summary, ended)| {
-            let id = id.clone();
-            async move {
-                if ended {
-                    return None;
-                }
-                let line = match lines.next().await {
-                    Some((index, _, Ok(answer))) => {
-                        summary.ok += 1;
-                        BatchLine::Answered {
-                            status: "ok",
-                            index,
-                            answer: Box::new(answer),
-                        }
-                    }
-                    Some((index, name, Err(problem))) => {
-                        summary.failed += 1;
-                        metrics::count_problem(problem.code);
-                        if let Some(internal) = &problem.internal {
-                            tracing::error!(code = problem.code.name(), internal, name, "{}", problem.detail);
-                        }
-                        BatchLine::Failed {
-                            status: "failed",
-                            index,
-                            name,
-                            problem: problem.to_json(id.as_deref()),
-                        }
-                    }
-                    // Cut short by a shutdown: no last line, so that nobody takes it for the whole.
-                    None if summary.ok + summary.failed < total => return None,
-                    None => {
-                        summary.total = total;
-                        return Some((line_of(&BatchLine::Summary { summary }), (lines, summary, true)));
-                    }
-                };
-                Some((line_of(&line), (lines, summary, false)))
-            }
-        },
-    );
+    let batch = Batch {
+        state,
+        live,
+        options,
+        poses,
+        id,
+    };
     let kind = [(header::CONTENT_TYPE, "application/x-ndjson")];
-    let mut response = (kind, Body::from_stream(body)).into_response();
+    let mut response = (kind, batch.body(upload.meshes)).into_response();
     if let Some(left) = left {
         left.tell(&mut response);
     }
     Ok(response)
 }
 
-fn line_of(line: &BatchLine) -> Result<Bytes, Infallible> {
-    // Strings, numbers and maps with string keys always serialise.
-    let mut text = serde_json::to_vec(line).unwrap_or_default();
-    text.push(b'\n');
-    Ok(text.into())
+fn poses_of(state: &AppState, options: &QueryOptions) -> Result<Poses, Problem> {
+    Poses::new(options.poses, options.pose, &state.config.limits)
 }
 
 /// The index the request is answered from, whatever is switched in meanwhile, what it brought, and what is left of
@@ -179,7 +131,16 @@ async fn begin(
     }
     let left = state.limits.take_queries(caller, 1)?;
     answerable(state)?;
-    let upload = upload::receive(state, request, options.name.clone()).await?;
+    let upload = match &options.shape {
+        Some(named) => {
+            let mesh = stored::receive(state, request, named.clone(), options.name.clone()).await?;
+            Upload {
+                meshes: vec![mesh],
+                ignored: Vec::new(),
+            }
+        }
+        None => upload::receive(state, request, options.name.clone()).await?,
+    };
     // What was switched in while the body arrived.
     Ok((answerable(state)?, upload, left))
 }
@@ -194,7 +155,7 @@ fn answerable(state: &AppState) -> Result<Arc<LiveIndex>, Problem> {
     Ok(live)
 }
 
-async fn rank(
+pub(in crate::http) async fn rank(
     state: &AppState,
     patience: Patience,
     live: Arc<LiveIndex>,

@@ -2,28 +2,24 @@
 
 use super::classes::{find_class, insert, is_at_hand};
 use crate::http::AppState;
-use crate::http::admission::Patience;
 use crate::http::auth::Caller;
 use crate::http::dto::class::ClassDto;
 use crate::http::dto::shape::{ShapeDto, UploadQuery, UploadResult};
 use crate::http::dto::{Binary, FilesForm, Page, PageQuery};
 use crate::http::extract::{ApiPath, ApiQuery};
+use crate::http::poses::check_poses;
 use crate::http::problem::{Code, Problem};
 use crate::http::problem_from::recovery_mode;
 use crate::http::request_memory::file_body;
 use crate::http::state::Parts;
-use crate::http::upload;
-use crate::http::uploaded::UploadedMesh;
-use crate::model::{Class, ClassName, NewShape, Shape, ShapeId, ShapePose};
+use crate::http::{checked, upload};
+use crate::model::{Class, ClassName, NewShape, Shape, ShapeId};
 use crate::store::{AddedShape, StoreError};
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use futures_util::{StreamExt, stream};
-use serde_json::Value;
-use shapelex_core::mesh::{Limits, PrepareOptions, ReadContext, TriangleSoup, prepare_within};
-use std::sync::{Arc, PoisonError};
+use std::sync::PoisonError;
 use tokio::io::AsyncReadExt;
 
 /// Upload shapes
@@ -85,7 +81,8 @@ pub async fn create_shapes(
         })
         .await?;
     let upload = upload::receive(&state, request, query.name).await?;
-    let shapes = check_all(&state, upload.meshes, query.poses, options).await?;
+    let shapes = checked::shapes_of(&state, upload.meshes, query.poses, options).await?;
+    let shapes = shapes.into_iter().flatten().collect();
     let (class, added) = state
         .blocking(move |s| store(s, &caller, &class, create, shapes))
         .await?;
@@ -101,119 +98,6 @@ pub async fn create_shapes(
         ignored: upload.ignored,
     };
     Ok((status, Json(body)).into_response())
-}
-
-fn check_poses(poses: Option<usize>, limits: &Limits) -> Result<(), Problem> {
-    match poses {
-        Some(poses) if !(1..=limits.max_poses).contains(&poses) => Err(Problem::new(
-            Code::InvalidQuery,
-            format!("poses must be between 1 and {}, got {poses}", limits.max_poses),
-        )
-        .with("name", "poses")),
-        _ => Ok(()),
-    }
-}
-
-/// Reads and prepares every mesh, as many at a time as there are query threads, each in a query's turn.
-async fn check_all(
-    state: &AppState,
-    meshes: Vec<UploadedMesh>,
-    poses: Option<usize>,
-    options: PrepareOptions,
-) -> Result<Vec<NewShape>, Problem> {
-    let total = meshes.len();
-    let limits = state.config.limits;
-    let names: Arc<Vec<String>> = Arc::new(meshes.iter().map(|m| m.name.clone()).collect());
-    // The first one queues like any request and may be turned away; the others follow it in.
-    let outcomes: Vec<Result<Vec<NewShape>, Problem>> = stream::iter(meshes.into_iter().enumerate())
-        .map(|(i, mesh)| {
-            let patience = if i == 0 {
-                Patience::Bounded
-            } else {
-                Patience::Batch
-            };
-            state
-                .compute
-                .run(patience, state.config.query_timeout, move |work| {
-                    let context = mesh.context(limits, &work.cancel);
-                    check_one(&mesh, poses, &context, &options)
-                })
-        })
-        .buffered(state.config.query_threads.max(1))
-        .collect()
-        .await;
-    let mut shapes = Vec::new();
-    let mut failures = Vec::new();
-    for (outcome, name) in outcomes.into_iter().zip(names.iter()) {
-        match outcome {
-            Ok(found) => shapes.extend(found),
-            // A full house or a fault is about the service, not about the file.
-            Err(problem) if problem.code.status().is_server_error() => return Err(problem),
-            Err(problem) => failures.push((name.clone(), problem)),
-        }
-    }
-    if failures.is_empty() {
-        return Ok(shapes);
-    }
-    if total == 1 {
-        return Err(failures.remove(0).1);
-    }
-    let failed = failures.len();
-    let list: Vec<Value> = failures
-        .into_iter()
-        .map(|(name, problem)| {
-            let mut entry = problem.to_json(None);
-            entry["name"] = name.into();
-            entry
-        })
-        .collect();
-    Err(Problem::new(
-        Code::UploadRejected,
-        format!("{failed} of {total} files could not be used; nothing was stored"),
-    )
-    .with("failed", failed)
-    .with("total", total)
-    .with("failures", list))
-}
-
-fn check_one(
-    mesh: &UploadedMesh,
-    poses: Option<usize>,
-    context: &ReadContext,
-    options: &PrepareOptions,
-) -> Result<Vec<NewShape>, Problem> {
-    // Shared by all poses.
-    let companions = mesh.companions();
-    let shape = |format, pose, soup: TriangleSoup| -> Result<NewShape, Problem> {
-        let (_, mut report) = prepare_within(soup, options, &context.cancel, &context.memory)?;
-        report.warnings.splice(0..0, context.warnings.list());
-        Ok(NewShape {
-            name: Some(mesh.name.clone()),
-            bytes: mesh.bytes.clone(),
-            companions: companions.clone(),
-            format,
-            pose,
-            report,
-        })
-    };
-    let Some(wanted) = poses else {
-        let (format, soup) = mesh.read(context)?;
-        return Ok(vec![shape(format, None, soup)?]);
-    };
-    let (format, found) = mesh.read_poses(wanted, context)?;
-    let of = found.len();
-    found
-        .into_iter()
-        .enumerate()
-        .map(|(index, pose)| {
-            let label = ShapePose {
-                label: pose.label,
-                index,
-                of,
-            };
-            shape(format, Some(label), pose.soup)
-        })
-        .collect()
 }
 
 fn store(
@@ -387,7 +271,8 @@ fn disposition(shape: &Shape) -> String {
     format!("attachment; filename*=UTF-8''{encoded}")
 }
 
-fn find_shape(parts: &Parts, class: &str, shape: &str) -> Result<Shape, Problem> {
+/// A shape of a class, both as the address names them.
+pub(in crate::http) fn find_shape(parts: &Parts, class: &str, shape: &str) -> Result<Shape, Problem> {
     let class = find_class(&parts.store, class)?;
     let missing = || {
         let shown: String = shape.chars().take(100).collect();
