@@ -15,7 +15,8 @@ use shapelex_core::baseline::BaselineIndex;
 use shapelex_core::coding::Dictionary;
 use shapelex_core::parameters::{Channel, Parameters};
 use shapelex_core::pipeline::ModelReport;
-use shapelex_core::ranking::{Calibration, Index, IndexedClass, NotJudged};
+use shapelex_core::ranking::{Calibration, Index, IndexedClass};
+use shapelex_core::retrieval::SearchIndex;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::Arc;
@@ -51,12 +52,15 @@ impl Exported {
         absent
     }
 
-    /// What scores shapes of the classes have.
-    ///
-    /// # Errors
-    /// Why that is not known: too few were learnt from, or the file does not say.
-    pub fn calibration(&self) -> Result<Calibration, NotJudged> {
-        Calibration::fit(self.reports.iter().map(|(name, report)| report.held_out(name)))
+    /// What a query is compared with.
+    pub fn into_search_index(self) -> SearchIndex {
+        let reports = self.reports.iter();
+        SearchIndex {
+            calibration: Calibration::fit(reports.map(|(name, report)| report.held_out(name))),
+            dictionaries: self.index,
+            names: BTreeMap::new(),
+            baselines: self.baselines,
+        }
     }
 }
 

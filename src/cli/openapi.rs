@@ -1,7 +1,8 @@
 //! `shapelex openapi`: the API's document.
 
 use super::{CliError, output};
-use crate::http::openapi::{document_json, document_yaml};
+use crate::http::openapi::document;
+use crate::http::routes::routes;
 
 /// Prints the OpenAPI document, as YAML or with `--json` as JSON.
 ///
@@ -9,9 +10,13 @@ use crate::http::openapi::{document_json, document_yaml};
 /// [`CliError::Failed`] where it cannot be written.
 pub fn run(json: bool) -> Result<(), CliError> {
     let document = if json {
-        document_json().map_err(|error| CliError::Failed(error.to_string()))?
+        document(routes())
+            .to_pretty_json()
+            .map_err(|error| CliError::Failed(error.to_string()))?
     } else {
-        document_yaml().map_err(|error| CliError::Failed(error.to_string()))?
+        document(routes())
+            .to_yaml()
+            .map_err(|error| CliError::Failed(error.to_string()))?
     };
     output::line(document.trim_end())
 }

@@ -2,7 +2,6 @@
 
 use super::ask::Question;
 use super::client::{CallError, Client, TargetArgs};
-use super::dictionaries::Exported;
 use super::files::MeshFile;
 use super::progress::Progress;
 use super::query_inputs::{Input, Place, gather};
@@ -10,17 +9,14 @@ use super::query_summary::Summary;
 use super::refused::Refused;
 use super::values::{at_least_one, one_of};
 use super::{CliError, dictionaries, output, query_text};
+use crate::http::dto::answer as dto;
 use crate::http::dto::parameters::QueryRankByName;
-use crate::http::dto::query::VerdictDto;
-use crate::http::dto::shape::ReportDto;
+use crate::http::dto::shape::PoseDto;
 use serde_json::{Value, json};
-use shapelex_core::cancel::Cancel;
 use shapelex_core::mesh::{
     Format, Limits, MeshError, Pose, ReadContext, TriangleSoup, read_poses_within, read_within,
 };
-use shapelex_core::parameters::RankBy;
-use shapelex_core::pipeline::{RankedClass, describe_query, judge, judged_by, rank_top};
-use shapelex_core::ranking::JUDGED;
+use shapelex_core::retrieval::{Deadline, QueryEngine, QueryError, QuerySpec, RankingMethod, SearchIndex};
 use std::path::PathBuf;
 
 /// Arguments of `query`.
@@ -61,7 +57,7 @@ static RANK_BY: [QueryRankByName; 7] = QueryRankByName::ALL;
 
 enum Source {
     Service(Client),
-    File(Box<Exported>, RankBy),
+    File(Box<SearchIndex>, QueryRankByName),
 }
 
 impl QueryArgs {
@@ -165,18 +161,16 @@ fn source(args: &QueryArgs) -> Result<Source, CliError> {
     let Some(path) = &args.dictionaries else {
         return Ok(Source::Service(args.target.client()?));
     };
-    let exported = dictionaries::load(path)?;
-    let rank_by = match args.rank_by.map(QueryRankByName::method) {
-        None => exported.index.parameters.rank_by,
-        Some(Ok(rank_by)) => rank_by,
-        Some(Err(_)) => {
-            return Err(CliError::Usage(
-                "--rank-by: a file of dictionaries has nothing for this method; query an index with --data or --server"
-                    .to_owned(),
-            ));
-        }
-    };
-    Ok(Source::File(Box::new(exported), rank_by))
+    let index = dictionaries::load(path)?.into_search_index();
+    let own = index.dictionaries.parameters.rank_by;
+    let rank_by = args.rank_by.unwrap_or(own.into());
+    if matches!(rank_by.method(), RankingMethod::Baseline(_)) && index.baselines.is_none() {
+        return Err(CliError::Usage(
+            "--rank-by: this file of dictionaries has nothing for this method; query an index with --data or --server"
+                .to_owned(),
+        ));
+    }
+    Ok(Source::File(Box::new(index), rank_by))
 }
 
 /// One answer or refusal per pose that was asked about.
@@ -187,9 +181,9 @@ impl Source {
         let limits = Limits::default();
         let client = match self {
             Self::Service(client) => client,
-            Self::File(exported, rank_by) => {
+            Self::File(index, rank_by) => {
                 let file = input.load(limits.max_bytes)?;
-                return rank_against(exported, &file, question, *rank_by, &limits);
+                return rank_against(index, &file, question, *rank_by, &limits);
             }
         };
         // Files that are not animated count once.
@@ -236,15 +230,18 @@ fn outcomes(found: Result<Vec<Result<Value, CallError>>, CallError>) -> Outcomes
     }
 }
 
+/// A mesh, and which pose of an animated file it is.
+type Posed = (Option<PoseDto>, TriangleSoup);
+
 /// The meshes of a file that are asked about.
 fn soups(
     file: &MeshFile,
     question: &Question,
     context: &ReadContext,
-) -> Result<(Format, Vec<(Value, TriangleSoup)>), CliError> {
+) -> Result<(Format, Vec<Posed>), CliError> {
     let resting = || -> Result<_, CliError> {
         let (format, soup) = read_within(&file.source(), context)?;
-        Ok((format, vec![(Value::Null, soup)]))
+        Ok((format, vec![(None, soup)]))
     };
     let Some(poses) = question.poses else {
         return resting();
@@ -257,97 +254,60 @@ fn soups(
     let of = found.len();
     let meant = |(index, _): &(usize, Pose)| question.pose.is_none_or(|pose| pose == *index);
     let found = found.into_iter().enumerate().filter(meant).map(|(index, pose)| {
-        let label = json!({ "label": pose.label, "index": index, "of": of });
-        (label, pose.soup)
+        let label = pose.label;
+        (Some(PoseDto { label, index, of }), pose.soup)
     });
     Ok((format, found.collect()))
 }
 
-/// The same stages as the service's query, on an index that came out of a file. The answers have the members of the
-/// API's answer that have a meaning without a service.
+/// The service's query, on an index that came out of a file.
 fn rank_against(
-    exported: &Exported,
+    index: &SearchIndex,
     file: &MeshFile,
     question: &Question,
-    rank_by: RankBy,
+    rank_by: QueryRankByName,
     limits: &Limits,
 ) -> Outcomes {
     let context = ReadContext::new(*limits);
     let (format, soups) = soups(file, question, &context)?;
-    let top = question.top.unwrap_or(usize::MAX);
     let ranked = soups.into_iter().map(|(pose, soup)| {
-        let mut answer = rank_soup(exported, soup, top, rank_by, &context.warnings.list())?;
-        answer["name"] = json!(file.name);
-        answer["pose"] = pose;
-        answer["format"] = json!(format);
-        Ok(answer)
+        let asked = dto::Question {
+            name: &file.name,
+            pose,
+            format,
+            rank_by,
+            top: question.top,
+            details: None,
+        };
+        rank_soup(index, soup, &asked, &context.warnings.list())
     });
     Ok(ranked.collect())
 }
 
+/// The API's answer, without what only a service knows and without members under former names.
 fn rank_soup(
-    exported: &Exported,
+    index: &SearchIndex,
     soup: TriangleSoup,
-    top: usize,
-    rank_by: RankBy,
+    asked: &dto::Question<'_>,
     warnings: &[String],
 ) -> Result<Value, CliError> {
-    let index = &exported.index;
-    let cancel = Cancel::new();
-    let mut description = describe_query(soup, &index.parameters, &cancel, &|_| ())?;
-    description.report.warnings.splice(0..0, warnings.iter().cloned());
-    // The verdict is about the first few, however many are shown.
-    let ranking = rank_top(&description.views, index, rank_by, top.max(JUDGED), &cancel)
-        .map_err(shapelex_core::pipeline::PipelineError::from)?;
-    let calibration = exported.calibration();
-    let ranked: Vec<RankedClass<'_>> = ranking
-        .classes
-        .iter()
-        .map(|class| RankedClass {
-            label: &class.label,
-            name: &class.label,
-            score: class.score,
-        })
-        .collect();
-    let judged = judge(
-        judged_by(&calibration, &index.parameters, rank_by, &description),
-        &ranked,
-    );
-    let classes: Vec<Value> = ranking
-        .classes
-        .iter()
-        .zip(&judged.p_values)
-        .take(top)
-        .enumerate()
-        .map(|(i, (c, p_value))| {
-            json!({
-                "rank": i + 1,
-                "class": { "name": c.label },
-                "score": c.score,
-                "reconstruction_error": c.frobenius_error,
-                "relative_error": c.relative_error,
-                "mean_objective": c.mean_objective,
-                "trimmed_objective": c.trimmed_objective,
-                "mean_nonzeros": c.mean_nonzeros,
-                "hypothesis": c.hypothesis,
-                "margin": c.margin,
-                "p_value": p_value,
-            })
-        })
-        .collect();
-    Ok(json!({
-        "classes": classes,
-        "verdict": VerdictDto::from(judged.verdict.clone()),
-        "probability": judged.verdict.probability,
-        "none_of_these": judged.none_of_these,
-        "margin": ranking.confidence,
-        "compared": ranking.compared,
-        "pruned": ranking.pruned,
-        "signatures": ranking.signatures,
-        "warnings": description.report.warnings,
-        "mesh": ReportDto::from(description.report),
-        "eigenvalues": description.eigenvalues,
-        "rank_by": rank_by,
-        "parameters": index.parameters,
-    }))
+    let spec = QuerySpec {
+        method: asked.rank_by.method(),
+        top: asked.top,
+    };
+    let outcome = QueryEngine::default()
+        .run(index, soup, &spec, &Deadline::default())
+        .map_err(|error| match error {
+            QueryError::Pipeline(error) => error.into(),
+            other => CliError::Failed(other.to_string()),
+        })?;
+    let mut answer = asked.answered(index, outcome);
+    answer.warnings.splice(0..0, warnings.iter().cloned());
+    let mut answer = serde_json::to_value(answer).map_err(|error| CliError::Failed(error.to_string()))?;
+    if let Some(members) = answer.as_object_mut() {
+        for member in ["confidence", "generation", "timings_ms"] {
+            members.remove(member);
+        }
+    }
+    Ok(answer)
 }

@@ -27,6 +27,17 @@ struct Open {
     length: u64,
 }
 
+/// Which request an entry is about.
+#[derive(Clone, Copy, Debug)]
+pub struct Request<'a> {
+    /// Its id.
+    pub id: &'a str,
+    /// Its operation.
+    pub operation: &'a str,
+    /// Its address.
+    pub path: &'a str,
+}
+
 /// One request that changed something, or was kept from it.
 #[derive(Serialize)]
 pub struct Entry<'a> {
@@ -51,21 +62,14 @@ pub struct Entry<'a> {
 
 impl<'a> Entry<'a> {
     /// An entry of now.
-    pub fn new(
-        request_id: &'a str,
-        caller: &'a Caller,
-        operation: &'a str,
-        path: &'a str,
-        status: u16,
-        outcome: &'a str,
-    ) -> Self {
+    pub fn new(request: &Request<'a>, caller: &'a Caller, status: u16, outcome: &'a str) -> Self {
         Self {
             at: Timestamp::now(),
-            request_id,
+            request_id: request.id,
             who: caller.name(),
             key: caller.key.as_ref().map(|key| key.id.to_string()),
-            operation,
-            path,
+            operation: request.operation,
+            path: request.path,
             status,
             outcome,
         }
@@ -149,14 +153,13 @@ mod tests {
         let audit = Audit::with_limit(directory.path(), 400).unwrap();
         let caller = Caller::default();
         for i in 0..4 {
-            audit.write(&Entry::new(
-                &format!("r{i}"),
-                &caller,
-                "create_class",
-                "/v1/classes",
-                201,
-                "done",
-            ));
+            let id = format!("r{i}");
+            let request = Request {
+                id: &id,
+                operation: "create_class",
+                path: "/v1/classes",
+            };
+            audit.write(&Entry::new(&request, &caller, 201, "done"));
         }
         let read = |name: &str| std::fs::read_to_string(directory.path().join(name)).unwrap();
         let (old, new) = (read("audit.log.1"), read("audit.log"));

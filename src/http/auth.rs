@@ -1,9 +1,10 @@
 //! Who asks, and whether they may: API keys and their scopes.
 
+use super::access::Access;
 use super::config::ServiceConfig;
 use super::problem::{Code, Problem};
 use super::state::Parts;
-use crate::model::{ApiKey, Scope};
+use crate::model::ApiKey;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts as RequestParts;
 use axum::http::{HeaderMap, HeaderName, header};
@@ -13,54 +14,6 @@ use std::sync::Arc;
 
 /// The other header a key may come in.
 pub const API_KEY: HeaderName = HeaderName::from_static("x-api-key");
-
-/// What an operation demands of whoever calls it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Access {
-    /// Nothing: probes, pages and the API's description.
-    Public,
-    /// A key of this scope or a greater one, where keys are on.
-    Needs(Scope),
-}
-
-/// What requests belong to whose address or method no operation has; nothing is done for them.
-pub const UNMATCHED: &str = "unmatched";
-
-/// What an operation demands. One that is not listed needs the greatest scope, so that a new one is closed until it
-/// is decided about.
-pub fn access_of(operation: &str) -> Access {
-    match operation {
-        "get_liveness" | "get_readiness" | "get_page" | "get_docs" | "get_openapi_yaml"
-        | "get_openapi_json" => Access::Public,
-        "list_classes" | "get_class" | "list_shapes" | "get_shape" | "get_original" | "list_jobs"
-        | "get_job" | "follow_job" | "query_mesh" | "query_batch" | "get_index" | "get_parameters"
-        | "get_metrics" => Access::Needs(Scope::Read),
-        "create_class" | "rename_class" | "delete_class" | "create_shapes" | "upload_dataset"
-        | "delete_shape" | "start_reindex" | "cancel_job" => Access::Needs(Scope::Write),
-        _ => Access::Needs(Scope::Admin),
-    }
-}
-
-/// Whether an operation only asks how the service is; probes are answered by any name and are not logged.
-pub fn is_probe(operation: &str) -> bool {
-    matches!(operation, "get_liveness" | "get_readiness")
-}
-
-/// Whether an operation needs the local token as long as there is no key: what hands the service over to another owner,
-/// that is keys and restoring. What needs a key of scope `admin` and is not listed does, so that a new operation is
-/// closed until it is decided about.
-pub fn needs_local_token(operation: &str) -> bool {
-    let open = matches!(
-        operation,
-        UNMATCHED
-            | "create_snapshot"
-            | "list_snapshots"
-            | "get_snapshot"
-            | "get_snapshot_file"
-            | "delete_snapshot"
-    );
-    access_of(operation) == Access::Needs(Scope::Admin) && !open
-}
 
 /// Who asks: a key, or nobody in particular where keys are off. Among the extensions of every request.
 #[derive(Clone, Debug, Default)]
@@ -96,18 +49,13 @@ pub fn needs_a_key_to_start(config: &ServiceConfig) -> bool {
 }
 
 /// Finds out who asks, and whether they may ask for the operation: `unauthorized` or `insufficient_scope` where they may not.
-pub fn authorize(
-    parts: &Parts,
-    headers: &HeaderMap,
-    operation: &str,
-    access: Access,
-) -> (Caller, Result<(), Problem>) {
-    let Access::Needs(scope) = access else {
+pub fn authorize(parts: &Parts, headers: &HeaderMap, access: Access) -> (Caller, Result<(), Problem>) {
+    let Some(scope) = access.scope() else {
         return (Caller::default(), Ok(()));
     };
     if !keys_are_on(parts) {
         let allowed = !parts.config.check_keys
-            || !needs_local_token(operation)
+            || access != Access::Owner
             || presented(headers).is_some_and(|token| parts.local_token.is(token));
         let refused = || Err(Problem::new(Code::Unauthorized, NEEDS_TOKEN));
         return (Caller::default(), if allowed { Ok(()) } else { refused() });

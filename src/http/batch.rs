@@ -5,7 +5,7 @@ use super::dto::query::{BatchLine, BatchSummary, QueryAnswer, QueryOptions};
 use super::metrics;
 use super::poses::Poses;
 use super::problem::Problem;
-use super::routes::query::rank;
+use super::run_query::run_query;
 use super::state::AppState;
 use super::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
@@ -93,7 +93,7 @@ impl Batch {
                             let Batch {
                                 state, live, options, ..
                             } = batch;
-                            rank(&state, Patience::Batch, live, mesh.clone(), options).await
+                            run_query(&state, Patience::Batch, live, mesh.clone(), options).await
                         }
                         Err(problem) => Err(problem),
                     };

@@ -4,7 +4,8 @@
 //! service for a part of that site and lets the page read all answers. The name stays in the request's `Host`, so a name
 //! that is not the service's is refused.
 
-use super::auth::{self, is_probe};
+use super::access::Access;
+use super::auth;
 use super::config::ServiceConfig;
 use super::problem::{Code, Problem};
 use super::state::Parts;
@@ -23,8 +24,8 @@ pub struct Peer(pub SocketAddr);
 ///
 /// # Errors
 /// `misdirected_request`; `invalid_request` where the name is missing or given twice.
-pub fn check(parts: &Parts, request: &Request, operation: &str) -> Result<(), Problem> {
-    if !parts.config.check_keys || is_probe(operation) {
+pub fn check(parts: &Parts, request: &Request, access: Access) -> Result<(), Problem> {
+    if !parts.config.check_keys || access == Access::Probe {
         return Ok(());
     }
     let by_socket = request.extensions().get::<Peer>().is_some();

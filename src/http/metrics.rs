@@ -3,10 +3,9 @@
 //! Every series exists from the start, at zero, and labels come from closed lists only: operations of the route table,
 //! stages of the pipeline, failure codes.
 
+use super::operation::{Operations, UNMATCHED};
 use super::problem::Code;
-use super::state::AppState;
 use crate::jobs::metrics::JOB_SECONDS;
-use crate::store::ScrubReport;
 use ::metrics::{counter, describe_counter, describe_gauge, describe_histogram, gauge, histogram};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use shapelex_core::pipeline::Stage;
@@ -35,8 +34,8 @@ const BUILD_INFO: &str = "shapelex_build_info";
 
 static RECORDER: OnceLock<PrometheusHandle> = OnceLock::new();
 
-/// The process's recorder; the first call installs it.
-pub fn install() -> &'static PrometheusHandle {
+/// Installs the process's recorder, once, with a series for each of the operations.
+pub fn install(operations: &Operations) {
     RECORDER.get_or_init(|| {
         // Buckets are constants, so setting them fails for no value.
         let builder = PrometheusBuilder::new()
@@ -50,8 +49,16 @@ pub fn install() -> &'static PrometheusHandle {
             tracing::warn!("another metrics recorder is installed; /metrics stays empty");
         }
         describe();
-        zero();
+        zero(operations);
         handle
+    });
+}
+
+/// Everything that was counted and set, in the text format; empty before [`install`].
+pub fn text() -> String {
+    RECORDER.get().map_or_else(String::new, |handle| {
+        handle.run_upkeep();
+        handle.render()
     })
 }
 
@@ -120,8 +127,9 @@ fn describe() {
     describe_gauge!("shapelex_ready", "1 where the service is ready");
 }
 
-fn zero() {
-    for operation in super::openapi::operation_ids().chain(["unmatched".to_owned()]) {
+fn zero(operations: &Operations) {
+    let known = operations.iter().map(|info| info.operation.clone());
+    for operation in known.chain([UNMATCHED.to_owned()]) {
         for status in ["2xx", "3xx", "4xx", "5xx"] {
             counter!(REQUESTS, "operation" => operation.clone(), "status" => status).increment(0);
         }
@@ -194,49 +202,4 @@ pub fn count_answer(none_of_these: Option<bool>, p_value: Option<f64>) {
 /// A panic was caught.
 pub fn count_panic() {
     counter!(PANICS).increment(1);
-}
-
-/// Everything, as Prometheus reads it. Gauges are read off the service now.
-pub fn render(state: &AppState) -> String {
-    let handle = install();
-    let live = state.jobs.live_index();
-    gauge!("shapelex_compute_running").set(state.compute.running() as f64);
-    gauge!("shapelex_compute_waiting").set(state.compute.waiting() as f64);
-    gauge!("shapelex_memory_reserved_bytes").set(state.memory.used() as f64);
-    gauge!("shapelex_memory_limit_bytes").set(state.memory.limit() as f64);
-    gauge!("shapelex_body_bytes").set(state.memory.bodies() as f64);
-    gauge!("shapelex_connections").set(state.connections.len() as f64);
-    gauge!("shapelex_api_keys").set(state.keys.len() as f64);
-    gauge!("shapelex_jobs_pending").set(state.jobs.queue_depth() as f64);
-    gauge!("shapelex_index_generation").set(live.generation.as_ref().map_or(0, |g| g.number) as f64);
-    gauge!("shapelex_ready").set(f64::from(u8::from(state.readiness().is_ready())));
-    let exists = |label: &str| match label.parse() {
-        Ok(id) => state.store.class(id).is_ok(),
-        Err(_) => false,
-    };
-    let known = live.index.classes.iter().filter(|class| exists(&class.label));
-    gauge!("shapelex_index_classes").set(known.count() as f64);
-    if let Ok(statistics) = state.store.statistics() {
-        gauge!("shapelex_classes").set(statistics.classes as f64);
-        gauge!("shapelex_shapes").set(statistics.shapes as f64);
-        gauge!("shapelex_original_bytes").set(statistics.bytes as f64);
-    }
-    if let Some(free) = state.store.disk_free() {
-        gauge!("shapelex_disk_free_bytes").set(free as f64);
-    }
-    read_integrity(state);
-    metrics_process::Collector::default().collect();
-    handle.run_upkeep();
-    handle.render()
-}
-
-fn read_integrity(state: &AppState) {
-    let damage = state.store.damage();
-    gauge!("shapelex_damaged_originals").set(damage.originals.len() as f64);
-    gauge!("shapelex_damaged_records").set(damage.records.len() as f64);
-    let last = state.store.last_scrub();
-    let of = |value: fn(&ScrubReport) -> f64| last.as_ref().map_or(0.0, value);
-    gauge!("shapelex_scrub_timestamp_seconds").set(of(|last| last.finished_at.as_second() as f64));
-    gauge!("shapelex_scrub_originals").set(of(|last| last.originals as f64));
-    gauge!("shapelex_scrub_records").set(of(|last| last.records as f64));
 }

@@ -1,8 +1,9 @@
 //! The HTTP service: requests → jobs, store, pipeline, and nothing computed here.
 //!
-//! [`router::router`] has every route on one screen; a handler's name is its operation's id in `openapi.yaml`, which
-//! [`openapi`] makes out of the handlers. Every answer that is not a success is a [`problem::Problem`].
+//! [`routes::routes`] is the table of routes, from which router, OpenAPI document, access control, metrics and audit log
+//! are derived; a handler's name is its operation's id in `openapi.yaml`. Every answer that is not a success is a [`problem::Problem`].
 
+pub mod access;
 pub mod admission;
 pub mod answer;
 pub mod archive;
@@ -20,6 +21,7 @@ pub mod connections;
 mod dataset;
 pub mod dto;
 pub mod extract;
+pub mod gauges;
 pub mod host;
 mod housekeeping;
 pub mod keyring;
@@ -27,22 +29,27 @@ pub mod limits;
 mod linger;
 pub mod local_access;
 pub mod metrics;
+pub mod middleware;
 mod multipart;
+mod open;
 pub mod openapi;
+pub mod operation;
 mod origin;
 mod poses;
 pub mod problem;
 mod problem_from;
+mod problem_sets;
 mod query_string;
-mod ranked;
 mod recovery_mode;
 mod request_memory;
-pub mod respond;
+pub mod route;
 pub mod router;
-mod routes;
+pub mod routes;
+mod run_query;
 mod scrubber;
 pub mod serve;
 pub mod state;
+mod stopwatch;
 mod stored;
 mod stream;
 mod time_limit;
@@ -52,7 +59,8 @@ pub mod upload;
 pub mod uploaded;
 
 pub use config::ServiceConfig;
+pub use open::OpenError;
 pub use router::router;
 pub use serve::{announce, serve};
-pub use state::{AppState, OpenError};
+pub use state::AppState;
 pub use tls::check_tls;

@@ -7,8 +7,9 @@
 use super::connection::{ConnectionServer, turn_away};
 use super::housekeeping;
 use super::local_access::{LocalAccess, local_url};
+use super::open::OpenError;
 use super::scrubber;
-use super::state::{AppState, OpenError};
+use super::state::AppState;
 use super::tls::TlsError;
 use crate::store::Health;
 use crate::store::error::is_out_of_descriptors;

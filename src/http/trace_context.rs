@@ -40,7 +40,7 @@ pub fn trace_parent(headers: &HeaderMap) -> Option<TraceParent<'_>> {
 /// Where traces are exported: makes the request's span a child of its caller's, or the root of a trace of its own, and
 /// calls it after the operation. Must come before anything happens in the span.
 #[cfg(feature = "otlp")]
-pub fn begin(span: &tracing::Span, parent: Option<TraceParent<'_>>, operation: &'static str) {
+pub fn begin(span: &tracing::Span, parent: Option<TraceParent<'_>>, operation: &str) {
     use opentelemetry::Context;
     use opentelemetry::trace::{SpanContext, SpanId, TraceContextExt, TraceFlags, TraceId, TraceState};
     use tracing_opentelemetry::OpenTelemetrySpanExt;
@@ -83,7 +83,7 @@ pub fn end(span: &tracing::Span, status: StatusCode, outcome: &'static str) {
 
 /// Without traces there is nothing to place.
 #[cfg(not(feature = "otlp"))]
-pub fn begin(_: &tracing::Span, _: Option<TraceParent<'_>>, _: &'static str) {}
+pub fn begin(_: &tracing::Span, _: Option<TraceParent<'_>>, _: &str) {}
 
 /// Without traces there is nothing to end.
 #[cfg(not(feature = "otlp"))]

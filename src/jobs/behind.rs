@@ -4,7 +4,6 @@
 use super::{Inner, JobError, Jobs, LiveIndex, live, share, worker};
 use crate::model::{JobKind, ReindexScope};
 use crate::store::StoreError;
-use std::sync::Arc;
 
 /// What is still to be done.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,10 +40,10 @@ impl Inner {
     }
 
     fn read(&self) -> Result<(), JobError> {
-        let (live, lost) = live::load(&self.store)?;
+        let (live, lost) = live::load(&self.store)?.into_index();
         warn_of_a_large_index(&live, self.options.memory_bytes);
         worker::requeue_interrupted(self)?;
-        self.live.store(Arc::new(live));
+        self.live.publish(&self.store, &live, || Ok(()))?;
         let mut state = self.state();
         state.behind = Behind {
             unread: false,

@@ -3,7 +3,6 @@
 use super::{JobError, Jobs, live};
 use crate::model::{JobKind, ReindexScope};
 use crate::store::StoreError;
-use std::sync::Arc;
 
 impl Jobs {
     /// Does work while no job waits or runs and none can be asked for, and loads the live index afterwards.
@@ -25,8 +24,8 @@ impl Jobs {
         }
         let unpause = Unpause(self);
         let done = work()?;
-        let (index, lost) = live::load(&self.inner.store)?;
-        self.inner.live.store(Arc::new(index));
+        let (index, lost) = live::load(&self.inner.store)?.into_index();
+        self.inner.live.publish(&self.inner.store, &index, || Ok(()))?;
         drop(unpause);
         if lost {
             self.enqueue(JobKind::Reindex {

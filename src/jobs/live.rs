@@ -1,45 +1,108 @@
-//! The index in memory.
+//! The index that is served: what a generation's records hold, loaded into memory.
 
 use super::trim;
-use crate::model::Generation;
+use crate::model::{ClassId, Generation};
 use crate::store::{Store, StoreError};
+use arc_swap::ArcSwap;
 use shapelex_core::baseline::BaselineIndex;
-use shapelex_core::ranking::{Calibration, Index, IndexedClass, NotJudged};
+use shapelex_core::ranking::{Calibration, Index, NotJudged};
+use shapelex_core::retrieval::SearchIndex;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
-/// The index queries run against. A query holds the one it began with, whatever is switched in meanwhile.
+/// The index that queries run against. A query holds the one it began with, also where another is published meanwhile.
 #[derive(Clone, Debug)]
 pub struct LiveIndex {
     /// `None` before the first reindex; the index is empty then.
     pub generation: Option<Generation>,
-    /// Its dictionaries in memory. A class's label is its [`ClassId`](crate::model::ClassId) as text, a shape's its
-    /// [`ShapeId`](crate::model::ShapeId).
-    pub index: Index,
-    /// What the baselines need, with the same labels; `None` where it was learnt without.
-    pub baselines: Option<BaselineIndex>,
-    /// What scores shapes of its classes have, with the same labels, or why that is not known.
-    pub calibration: Result<Calibration, NotJudged>,
+    /// The classes of the generation that still exist, under their present names. A class's label is its
+    /// [`ClassId`] as text, a shape's its [`ShapeId`](crate::model::ShapeId).
+    pub search: SearchIndex,
+}
+
+/// Holds the live index. Everything that changes what queries see goes through here.
+pub(super) struct Publisher {
+    live: ArcSwap<LiveIndex>,
+    /// Held from reading the catalogue to storing the index made from it, so that the later of two changes wins.
+    publishing: Mutex<()>,
+}
+
+impl Publisher {
+    /// Starts with an empty index.
+    pub fn new(store: &Store) -> Self {
+        Self {
+            live: ArcSwap::from_pointee(empty(store)),
+            publishing: Mutex::default(),
+        }
+    }
+
+    /// The index there is now.
+    pub fn current(&self) -> Arc<LiveIndex> {
+        self.live.load_full()
+    }
+
+    /// Publishes an index, without the classes that do not exist any more, once `switch` has made it the store's own.
+    ///
+    /// # Errors
+    /// Where the catalogue cannot be read, and those of `switch`; the index that is published stays then.
+    pub fn publish(
+        &self,
+        store: &Store,
+        index: &LiveIndex,
+        switch: impl FnOnce() -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
+        let _one = self.publishing.lock().unwrap_or_else(PoisonError::into_inner);
+        // Read first: after the switch nothing may fail.
+        let followed = index.of_catalogue(store)?;
+        switch()?;
+        self.live.store(Arc::new(followed));
+        Ok(())
+    }
+
+    /// Publishes the index there is anew, after classes were renamed or deleted.
+    ///
+    /// # Errors
+    /// As [`publish`](Self::publish).
+    pub fn follow_catalogue(&self, store: &Store) -> Result<(), StoreError> {
+        let _one = self.publishing.lock().unwrap_or_else(PoisonError::into_inner);
+        let followed = self.live.load().of_catalogue(store)?;
+        self.live.store(Arc::new(followed));
+        Ok(())
+    }
 }
 
 impl LiveIndex {
-    /// Memory its dictionaries and what the baselines need take now, in bytes.
-    pub fn resident_bytes(&self) -> usize {
-        let dictionaries: usize = self.index.classes.iter().map(IndexedClass::resident_bytes).sum();
-        dictionaries + self.baselines.as_ref().map_or(0, BaselineIndex::resident_bytes)
+    /// The same without classes that do not exist, and with the names the others have now.
+    fn of_catalogue(&self, store: &Store) -> Result<Self, StoreError> {
+        let classes = store.list_classes(None, usize::MAX)?;
+        let names: BTreeMap<String, String> = classes
+            .iter()
+            .map(|class| (class.id.to_string(), class.name.to_string()))
+            .collect();
+        Ok(Self {
+            generation: self.generation.clone(),
+            search: self.search.renamed(|label| names.get(label).cloned()),
+        })
+    }
+
+    /// Memory each of its classes takes, in bytes.
+    pub fn resident_bytes_by_class(&self) -> BTreeMap<ClassId, usize> {
+        let classes = self.search.dictionaries.classes.iter();
+        classes
+            .filter_map(|class| Some((class.label.parse().ok()?, class.resident_bytes())))
+            .collect()
     }
 }
 
 /// The calibration of a generation.
-pub(super) fn calibration(generation: &Generation) -> Result<Calibration, NotJudged> {
+fn calibration(generation: &Generation) -> Result<Calibration, NotJudged> {
     let labels: Vec<String> = generation.classes.iter().map(|c| c.class.to_string()).collect();
     let classes = generation.classes.iter().zip(&labels);
     Calibration::fit(classes.map(|(class, label)| class.report.held_out(label)))
 }
 
 /// What the baselines need of a generation. Ranking by sparse coding does without, so damage only costs the baselines.
-pub(super) fn load_baselines(
-    store: &Store,
-    generation: &Generation,
-) -> Result<Option<BaselineIndex>, StoreError> {
+fn load_baselines(store: &Store, generation: &Generation) -> Result<Option<BaselineIndex>, StoreError> {
     match store.load_baselines(generation) {
         Err(error @ StoreError::Damaged { .. }) => {
             tracing::warn!(%error, "the baselines cannot be loaded; a reindex brings them back");
@@ -49,53 +112,86 @@ pub(super) fn load_baselines(
     }
 }
 
-/// Loads the current generation, and says whether there was one that cannot be had any more.
-pub(super) fn load(store: &Store) -> Result<(LiveIndex, bool), StoreError> {
-    let loaded = store.generation().and_then(|generation| match generation {
-        None => Ok(None),
-        Some(generation) => store
-            .load_index(&generation)
-            .and_then(|index| Ok((index, load_baselines(store, &generation)?)))
-            .map(|(index, baselines)| Some((generation, index, baselines))),
-    });
-    let lost = match loaded {
-        Ok(Some((generation, index, baselines))) => {
-            trim::after_loading(store, &generation)?;
-            let live = LiveIndex {
-                calibration: calibration(&generation),
-                generation: Some(generation),
-                index,
-                baselines,
-            };
-            return Ok((live, false));
-        }
-        Ok(None) => store.next_generation_number()? > 1,
-        Err(error @ StoreError::Damaged { .. }) => {
-            tracing::error!(%error, "the index cannot be loaded");
-            true
-        }
-        Err(other) => return Err(other),
+/// Loads a generation.
+///
+/// # Errors
+/// Where its records cannot be read.
+pub(super) fn of_generation(store: &Store, generation: Generation) -> Result<LiveIndex, StoreError> {
+    let search = SearchIndex {
+        dictionaries: store.load_index(&generation)?,
+        names: BTreeMap::new(),
+        baselines: load_baselines(store, &generation)?,
+        calibration: calibration(&generation),
     };
-    let live = LiveIndex {
-        index: Index {
-            parameters: store.parameters()?,
-            classes: Vec::new(),
-        },
-        ..empty(store)
-    };
-    Ok((live, lost))
+    Ok(LiveIndex {
+        generation: Some(generation),
+        search,
+    })
 }
 
-/// No index, where there may well be one that is not to be loaded.
-pub(super) fn empty(store: &Store) -> LiveIndex {
+/// What a start or a restore finds in the store.
+pub(super) enum Loaded {
+    /// The index of the current generation, or an empty one where nothing was learnt yet.
+    Found(LiveIndex),
+    /// An empty index: the generation there was is gone or damaged.
+    Lost(LiveIndex),
+}
+
+impl Loaded {
+    /// Its index, and whether the generation was lost.
+    pub fn into_index(self) -> (LiveIndex, bool) {
+        match self {
+            Self::Found(index) => (index, false),
+            Self::Lost(index) => (index, true),
+        }
+    }
+}
+
+/// Loads the current generation.
+///
+/// # Errors
+/// Where the store cannot be read, for another reason than damage.
+pub(super) fn load(store: &Store) -> Result<Loaded, StoreError> {
+    let loaded = store.generation().and_then(|generation| {
+        let index = generation.map(|generation| of_generation(store, generation));
+        index.transpose()
+    });
+    let nothing = |store: &Store| -> Result<LiveIndex, StoreError> {
+        let mut index = empty(store);
+        index.search.dictionaries.parameters = store.parameters()?;
+        Ok(index)
+    };
+    match loaded {
+        Ok(Some(index)) => {
+            if let Some(generation) = &index.generation {
+                trim::after_loading(store, generation)?;
+            }
+            Ok(Loaded::Found(index))
+        }
+        Ok(None) if store.next_generation_number()? > 1 => Ok(Loaded::Lost(nothing(store)?)),
+        Ok(None) => Ok(Loaded::Found(nothing(store)?)),
+        Err(error @ StoreError::Damaged { .. }) => {
+            tracing::error!(%error, "the index cannot be loaded");
+            Ok(Loaded::Lost(nothing(store)?))
+        }
+        Err(other) => Err(other),
+    }
+}
+
+/// No index, also where there is one that is not to be loaded.
+fn empty(store: &Store) -> LiveIndex {
+    let dictionaries = Index {
+        // What was asked for last is only a hint while nothing is indexed.
+        parameters: store.parameters().unwrap_or_default(),
+        classes: Vec::new(),
+    };
     LiveIndex {
         generation: None,
-        index: Index {
-            // What was asked for last is only a hint while nothing is indexed.
-            parameters: store.parameters().unwrap_or_default(),
-            classes: Vec::new(),
+        search: SearchIndex {
+            dictionaries,
+            names: BTreeMap::new(),
+            baselines: None,
+            calibration: Err(NotJudged::TooFewShapes),
         },
-        baselines: None,
-        calibration: Err(NotJudged::TooFewShapes),
     }
 }

@@ -24,7 +24,6 @@ pub use live::LiveIndex;
 
 use crate::model::{ContentHash, Job, JobId, JobKind, JobState};
 use crate::store::Store;
-use arc_swap::ArcSwap;
 use jiff::Timestamp;
 use shapelex_core::cancel::Cancel;
 use shapelex_core::mesh::Limits;
@@ -72,7 +71,7 @@ pub struct Jobs {
 struct Inner {
     store: Store,
     options: JobOptions,
-    live: ArcSwap<LiveIndex>,
+    live: live::Publisher,
     pool: rayon::ThreadPool,
     state: Mutex<State>,
     /// Told of every change of `state` the worker or a shutdown waits for.
@@ -186,7 +185,7 @@ impl Jobs {
             .map_err(|e| no_worker(e.to_string()))?;
         let idle = store.recovery_mode().is_some();
         let inner = Arc::new(Inner {
-            live: ArcSwap::from_pointee(live::empty(&store)),
+            live: live::Publisher::new(&store),
             store,
             options,
             pool,
@@ -325,7 +324,15 @@ impl Jobs {
 
     /// The index queries run against. Never blocks; hold it for as long as a query runs, and it stays what it is.
     pub fn live_index(&self) -> Arc<LiveIndex> {
-        self.inner.live.load_full()
+        self.inner.live.current()
+    }
+
+    /// Lets queries see that classes were renamed or deleted.
+    ///
+    /// # Errors
+    /// [`JobError::Store`] where the catalogue cannot be read.
+    pub fn follow_catalogue(&self) -> Result<(), JobError> {
+        Ok(self.inner.live.follow_catalogue(&self.inner.store)?)
     }
 
     /// Jobs waiting or being worked on. Never blocks.

@@ -3,7 +3,7 @@
 use super::baselines::learn_baselines;
 use super::describe::{Described, Describer, Failure};
 use super::failure::{MEMORY_EXCEEDED, ReindexError, code, no_memory};
-use super::live::{LiveIndex, calibration, load_baselines};
+use super::live::{Publisher, of_generation};
 use super::plan::{Plan, ToLearn, plan, shape_key, skipped};
 use super::progress::Progress;
 use super::share::{Share, index_bytes};
@@ -13,7 +13,6 @@ use crate::model::{
     RelearnedClass, Shape, SkippedClass,
 };
 use crate::store::{Store, StoreError};
-use arc_swap::ArcSwap;
 use jiff::Timestamp;
 use shapelex_core::cancel::Cancel;
 use shapelex_core::memory::MemoryError;
@@ -21,7 +20,6 @@ use shapelex_core::mesh::Limits;
 use shapelex_core::parameters::Parameters;
 use shapelex_core::pipeline::estimate;
 use shapelex_core::pipeline::{Description, PipelineError, held_out_scores, learn_model};
-use std::sync::Arc;
 
 /// What is asked, and with what.
 pub(super) struct Reindex<'a> {
@@ -49,7 +47,7 @@ enum Learnt {
 
 /// Runs a reindex on the current rayon pool and swaps the live index at its end. Cancelled at any point before the
 /// switch, it leaves the index as it was; descriptions made so far stay cached.
-pub(super) fn reindex(request: &Reindex<'_>, live: &ArcSwap<LiveIndex>) -> Result<Outcome, ReindexError> {
+pub(super) fn reindex(request: &Reindex<'_>, live: &Publisher) -> Result<Outcome, ReindexError> {
     let store = request.store;
     let parameters = match request.parameters {
         Some(parameters) => parameters.clone(),
@@ -71,7 +69,7 @@ pub(super) fn reindex(request: &Reindex<'_>, live: &ArcSwap<LiveIndex>) -> Resul
     };
     let mut classes = keep;
     let kept = classes.len();
-    let served = live.load().generation.as_ref().map_or(0, index_bytes);
+    let served = live.current().generation.as_ref().map_or(0, index_bytes);
     let describer = Describer {
         share: request.share.beside(served),
         store,
@@ -323,13 +321,13 @@ fn switch(
     parameters: Parameters,
     mut classes: Vec<GenerationClass>,
     baselines: Option<String>,
-    live: &ArcSwap<LiveIndex>,
+    live: &Publisher,
 ) -> Result<Option<u64>, ReindexError> {
     let store = request.store;
     // Classes that were deleted while they were learnt.
     let existing = store.list_classes(None, usize::MAX)?;
     classes.retain(|class| existing.iter().any(|e| e.id == class.class));
-    let served = live.load().generation.as_ref().map(|g| g.number);
+    let served = live.current().generation.as_ref().map(|g| g.number);
     let same = match &current {
         Some(current) => {
             served == Some(current.number)
@@ -350,7 +348,7 @@ fn switch(
         baselines,
     };
     // Both are in memory while queries change over.
-    let before = live.load().generation.as_ref().map_or(0, index_bytes);
+    let before = live.current().generation.as_ref().map_or(0, index_bytes);
     let needed = before + index_bytes(&generation);
     let limit = request.share.bytes;
     if needed > limit {
@@ -359,19 +357,10 @@ fn switch(
         return Err(ReindexError::failed(MEMORY_EXCEEDED, detail));
     }
     // Loaded before the switch, so that nothing can fail after it.
-    let index = store.load_index(&generation)?;
-    let baselines = load_baselines(store, &generation)?;
-    store.put_generation_and_switch(&generation)?;
     let number = generation.number;
-    live.store(Arc::new(LiveIndex {
-        calibration: calibration(&generation),
-        generation: Some(generation),
-        index,
-        baselines,
-    }));
-    if let Some(generation) = &live.load().generation
-        && let Err(error) = trim::after_loading(store, generation)
-    {
+    let index = of_generation(store, generation.clone())?;
+    live.publish(store, &index, || store.put_generation_and_switch(&generation))?;
+    if let Err(error) = trim::after_loading(store, &generation) {
         // The store has closed and not opened again: the next request tells.
         tracing::error!(%error, "the store's cache could not be dropped");
     }

@@ -20,6 +20,7 @@ const ORDERS: [(&str, &[&str]); 3] = [
             "ranking",
             "pipeline",
             "baseline",
+            "retrieval",
         ],
     ),
     ("crates/shapelex-eval/src", &["sample", "benchmark", "figure"]),

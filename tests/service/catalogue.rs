@@ -237,7 +237,8 @@ async fn a_class_that_an_earlier_version_named_is_shown_filled_renamed_and_delet
 #[test]
 fn the_schema_of_names_says_what_the_code_does() {
     let document: serde_json::Value = serde_json::from_str(
-        &shapelex::http::openapi::document_json()
+        &shapelex::http::openapi::document(shapelex::http::routes::routes())
+            .to_pretty_json()
             .map_err(|e| e.to_string())
             .unwrap(),
     )

@@ -5,12 +5,11 @@ use crate::meshes::dense;
 use axum::Router;
 use axum::body::Body;
 use axum::http::Request;
-use axum::middleware::from_fn_with_state;
 use axum::routing::get;
 use serde_json::json;
-use shapelex::http::respond;
+use shapelex::http::middleware::around;
+use shapelex::http::operation::Operations;
 use std::time::Duration;
-use tower_http::catch_panic::CatchPanicLayer;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn probes_answer_and_readiness_names_what_is_wrong() {
@@ -87,16 +86,14 @@ async fn a_panic_is_a_problem_and_is_counted() {
             panic!("on purpose");
         }
     };
-    app.router = Router::new()
-        .route("/boom", get(boom))
-        .layer(CatchPanicLayer::custom(respond::panicked))
-        .layer(from_fn_with_state(app.state.clone(), respond::around));
+    let boom = Router::new().route("/boom", get(boom));
+    app.router = around(boom, &app.state, Operations::default()).with_state(app.state.clone());
     let body = app.get("/boom").await.fails(500, "internal");
     assert!(
         !body.to_string().contains("on purpose"),
         "what went wrong is for the log: {body}"
     );
-    let text = shapelex::http::metrics::render(&app.state);
+    let text = shapelex::http::gauges::render(&app.state);
     let count = text
         .lines()
         .find_map(|l| l.strip_prefix("shapelex_panics_total "));

@@ -46,7 +46,7 @@ fn with_imported(store: &Store) -> ClassId {
 fn indexed(jobs: &Jobs) -> Vec<(String, Origin)> {
     let live = jobs.live_index();
     let generation = live.generation.as_ref().unwrap();
-    assert_eq!(generation.classes.len(), live.index.classes.len());
+    assert_eq!(generation.classes.len(), live.search.dictionaries.classes.len());
     generation
         .classes
         .iter()

@@ -8,7 +8,8 @@ use shapelex::store::{Store, StoreOptions};
 use shapelex_core::cancel::Cancel;
 use shapelex_core::mesh::{Format, Limits, PrepareReport, Source};
 use shapelex_core::parameters::{Channel, Parameters};
-use shapelex_core::pipeline::{describe_query, rank};
+use shapelex_core::pipeline::describe_query;
+use shapelex_core::ranking::rank;
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 use std::path::Path;
@@ -124,11 +125,17 @@ fn best(jobs: &Jobs, lobes: f64) -> String {
     };
     let (_, soup) = shapelex_core::mesh::read(&source, &Limits::default()).unwrap();
     let live = jobs.live_index();
-    let query = describe_query(soup, &live.index.parameters, &Cancel::new(), &|_| {}).unwrap();
+    let query = describe_query(
+        soup,
+        &live.search.dictionaries.parameters,
+        &Cancel::new(),
+        &|_| {},
+    )
+    .unwrap();
     let ranking = rank(
         &query.views,
-        &live.index,
-        live.index.parameters.rank_by,
+        &live.search.dictionaries,
+        live.search.dictionaries.parameters.rank_by,
         &Cancel::new(),
     )
     .unwrap();
@@ -229,7 +236,7 @@ fn an_index_lives_through_changes_of_its_classes() {
     let key = generation.class(one).unwrap().dictionary.clone();
     store.delete_class(one).unwrap();
     done(&jobs, reindex(ReindexScope::Stale, None));
-    assert_eq!(jobs.live_index().index.classes.len(), 1);
+    assert_eq!(jobs.live_index().search.dictionaries.classes.len(), 1);
     assert!(store.dictionaries(&key).unwrap().is_none());
 
     let live = jobs.live_index();
@@ -242,7 +249,7 @@ fn an_index_lives_through_changes_of_its_classes() {
     let store = open(directory.path());
     let jobs = start(&store);
     assert_eq!(jobs.live_index().generation, live.generation);
-    assert_eq!(jobs.live_index().index.parameters, other);
+    assert_eq!(jobs.live_index().search.dictionaries.parameters, other);
     assert_eq!(best(&jobs, 3.0), three.to_string());
     assert_eq!(jobs.list(None, 2).unwrap().len(), 2);
 }
@@ -400,7 +407,8 @@ fn a_job_running_at_shutdown_goes_back_to_the_queue() {
 fn atoms(jobs: &Jobs, class: ClassId) -> Vec<f64> {
     let live = jobs.live_index();
     let class = live
-        .index
+        .search
+        .dictionaries
         .classes
         .iter()
         .find(|c| c.label == class.to_string())
@@ -428,7 +436,7 @@ fn a_lost_index_is_learnt_again_to_the_same_bytes() {
     assert_eq!(queued.len(), 1, "a reindex was queued unasked");
     let job = wait(&jobs, queued[0].id);
     assert_eq!((job.state, job.generation), (JobState::Succeeded, Some(2)));
-    assert_eq!(jobs.live_index().index.parameters, small());
+    assert_eq!(jobs.live_index().search.dictionaries.parameters, small());
     assert_eq!(atoms(&jobs, class), before);
 }
 
@@ -462,7 +470,7 @@ fn shapes_get_dictionaries_of_their_own_where_asked() {
     };
     done(&jobs, reindex(ReindexScope::Stale, Some(parameters)));
     let live = jobs.live_index();
-    let labels: Vec<_> = live.index.classes[0]
+    let labels: Vec<_> = live.search.dictionaries.classes[0]
         .shapes
         .iter()
         .map(|s| s.label.clone())

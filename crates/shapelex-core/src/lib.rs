@@ -7,7 +7,8 @@
 //!
 //! Data flows one way, and a module uses only what stands to its left:
 //!
-//! `cancel → memory → mesh → spectral → signature → coding → parameters → ranking → pipeline → baseline`
+//! `cancel → memory → mesh → spectral → signature → coding → parameters → ranking → pipeline → baseline →
+//! retrieval`
 //!
 //! There is no I/O, no clock that changes a result, and no global state; randomness comes from a seed in the
 //! parameters.
@@ -20,5 +21,6 @@ pub mod mesh;
 pub mod parameters;
 pub mod pipeline;
 pub mod ranking;
+pub mod retrieval;
 pub mod signature;
 pub mod spectral;

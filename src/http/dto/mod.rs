@@ -1,6 +1,7 @@
 //! What travels over the wire. Domain types are never serialised to a client: they change with the method, these
 //! change with the API's version. Types that come in refuse fields they do not know.
 
+pub mod answer;
 pub mod class;
 pub mod dataset;
 pub mod index;

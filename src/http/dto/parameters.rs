@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use shapelex_core::baseline::Baseline;
 use shapelex_core::mesh::Components;
 use shapelex_core::parameters::{Hypothesis, Parameters, Preset, RankBy};
+use shapelex_core::retrieval::RankingMethod;
 use shapelex_core::signature::descriptor::{Descriptor, WksRange};
 use shapelex_core::signature::normalise::Normalisation;
 use utoipa::ToSchema;
@@ -96,16 +97,16 @@ impl QueryRankByName {
         Self::BagOfWords,
     ];
 
-    /// The way of sparse coding, or the method to rank by instead.
-    pub fn method(self) -> Result<RankBy, Baseline> {
+    /// The method of this name.
+    pub fn method(self) -> RankingMethod {
         match self {
-            Self::Objective => Ok(RankBy::Objective),
-            Self::TrimmedObjective => Ok(RankBy::TrimmedObjective),
-            Self::Frobenius => Ok(RankBy::Frobenius),
-            Self::ShapeDna => Err(Baseline::ShapeDna),
-            Self::ShapeDnaRelative => Err(Baseline::ShapeDnaRelative),
-            Self::SignatureDistances => Err(Baseline::SignatureDistances),
-            Self::BagOfWords => Err(Baseline::BagOfWords),
+            Self::Objective => RankBy::Objective.into(),
+            Self::TrimmedObjective => RankBy::TrimmedObjective.into(),
+            Self::Frobenius => RankBy::Frobenius.into(),
+            Self::ShapeDna => RankingMethod::Baseline(Baseline::ShapeDna),
+            Self::ShapeDnaRelative => RankingMethod::Baseline(Baseline::ShapeDnaRelative),
+            Self::SignatureDistances => RankingMethod::Baseline(Baseline::SignatureDistances),
+            Self::BagOfWords => RankingMethod::Baseline(Baseline::BagOfWords),
         }
     }
 

@@ -1,11 +1,15 @@
 //! Classes: made, listed, shown, renamed, deleted.
 
 use crate::http::AppState;
+use crate::http::access::Access;
 use crate::http::auth::Caller;
 use crate::http::dto::class::{ClassDto, CreateClass, RenameClass};
 use crate::http::dto::{Page, PageQuery};
 use crate::http::extract::{ApiJson, ApiPath, ApiQuery};
 use crate::http::problem::{Code, Problem};
+use crate::http::problem_sets::{JSON, PAGE, WRITE};
+use crate::http::route::Route;
+use crate::model::Scope;
 use crate::model::{Class, ClassId, ClassName};
 use crate::store::{Store, StoreError};
 use axum::Json;
@@ -13,6 +17,45 @@ use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use std::sync::PoisonError;
+use utoipa_axum::routes;
+
+/// The routes of this file: handler, what it demands, the problems of its own.
+pub(super) fn routes() -> Vec<Route> {
+    use Code::*;
+    vec![
+        Route::new(routes!(list_classes), Access::Needs(Scope::Read), &[PAGE]),
+        Route::new(
+            routes!(create_class),
+            Access::Needs(Scope::Write),
+            &[JSON, WRITE, &[InvalidName, ClassExists, QuotaExceeded]],
+        ),
+        Route::new(
+            routes!(get_class),
+            Access::Needs(Scope::Read),
+            &[&[InvalidRequest, ClassNotFound]],
+        ),
+        Route::new(
+            routes!(rename_class),
+            Access::Needs(Scope::Write),
+            &[
+                JSON,
+                WRITE,
+                &[
+                    InvalidRequest,
+                    InvalidName,
+                    ClassNotFound,
+                    ClassExists,
+                    RevisionMismatch,
+                ],
+            ],
+        ),
+        Route::new(
+            routes!(delete_class),
+            Access::Needs(Scope::Write),
+            &[WRITE, &[InvalidRequest, ClassNotFound, RevisionMismatch]],
+        ),
+    ]
+}
 
 /// Make a class
 ///
@@ -127,7 +170,9 @@ pub async fn rename_class(
             let _alone = s.catalogue.lock().unwrap_or_else(PoisonError::into_inner);
             let class = find_class(&s.store, &class)?;
             check_match(&headers, &class)?;
-            Ok(s.store.rename_class(class.id, name)?)
+            let renamed = s.store.rename_class(class.id, name)?;
+            s.jobs.follow_catalogue()?;
+            Ok(renamed)
         })
         .await?;
     Ok(answer(&state, StatusCode::OK, class))
@@ -155,6 +200,7 @@ pub async fn delete_class(
             let class = find_class(&s.store, &class)?;
             check_match(&headers, &class)?;
             s.store.delete_class(class.id)?;
+            s.jobs.follow_catalogue()?;
             Ok(StatusCode::NO_CONTENT)
         })
         .await

@@ -1,6 +1,7 @@
 //! Datasets: many classes in one upload.
 
 use crate::http::AppState;
+use crate::http::access::Access;
 use crate::http::auth::Caller;
 use crate::http::checked::{self, rejected};
 use crate::http::dataset::{Placed, class_name, places};
@@ -10,12 +11,16 @@ use crate::http::dto::class::ClassDto;
 use crate::http::dto::dataset::{DatasetClass, DatasetQuery, DatasetResult};
 use crate::http::extract::ApiQuery;
 use crate::http::poses::check_poses;
+use crate::http::problem::Code;
 use crate::http::problem::Problem;
 use crate::http::problem_from::recovery_mode;
+use crate::http::problem_sets::{MESH, POOL, UPLOAD, WRITE};
+use crate::http::route::Route;
 use crate::http::state::Parts;
 use crate::http::upload;
 use crate::http::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
+use crate::model::Scope;
 use crate::model::{ClassName, NewShape};
 use crate::store::{ClassShapes, FilledClass, Store};
 use axum::Json;
@@ -24,6 +29,30 @@ use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use std::collections::BTreeMap;
 use std::sync::PoisonError;
+use utoipa_axum::routes;
+
+/// The routes of this file: handler, what it demands, the problems of its own.
+pub(super) fn routes() -> Vec<Route> {
+    use Code::*;
+    vec![Route::new(
+        routes!(upload_dataset),
+        Access::Needs(Scope::Write),
+        &[
+            UPLOAD,
+            MESH,
+            POOL,
+            WRITE,
+            &[
+                InvalidName,
+                FileWithoutClass,
+                UploadRejected,
+                NoAnimation,
+                QuotaExceeded,
+                ClassExists,
+            ],
+        ],
+    )]
+}
 
 /// Upload a dataset
 ///

@@ -1,9 +1,22 @@
 //! The page, and the API's description for machines and for people.
 
 use crate::http::AppState;
+use crate::http::access::Access;
+use crate::http::route::Route;
 use axum::extract::State;
 use axum::http::{HeaderName, header};
 use axum::response::IntoResponse;
+use utoipa_axum::routes;
+
+/// The routes of this file: handler, what it demands, the problems of its own.
+pub(super) fn routes() -> Vec<Route> {
+    vec![
+        Route::new(routes!(get_page), Access::Public, &[]),
+        Route::new(routes!(get_docs), Access::Public, &[]),
+        Route::new(routes!(get_openapi_yaml), Access::Public, &[]),
+        Route::new(routes!(get_openapi_json), Access::Public, &[]),
+    ]
+}
 
 /// Nothing is loaded from elsewhere, and no other site may frame the pages.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; \

@@ -1,9 +1,12 @@
 //! What an operator's probes ask.
 
 use crate::http::AppState;
-use crate::http::metrics;
+use crate::http::access::Access;
+use crate::http::gauges;
 use crate::http::problem::{Code, Problem};
+use crate::http::route::Route;
 use crate::http::state::Condition;
+use crate::model::Scope;
 use crate::store::ScrubReport;
 use axum::Json;
 use axum::extract::State;
@@ -13,6 +16,17 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
+use utoipa_axum::routes;
+
+/// The routes of this file: handler, what it demands, the problems of its own.
+pub(super) fn routes() -> Vec<Route> {
+    use Code::*;
+    vec![
+        Route::new(routes!(get_liveness), Access::Probe, &[]),
+        Route::new(routes!(get_readiness), Access::Probe, &[&[NotReady]]),
+        Route::new(routes!(get_metrics), Access::Needs(Scope::Read), &[]),
+    ]
+}
 
 /// That the process answers.
 #[derive(Serialize, ToSchema)]
@@ -129,7 +143,7 @@ pub async fn get_readiness(State(state): State<AppState>) -> Result<Json<Ready>,
 )]
 pub async fn get_metrics(State(state): State<AppState>) -> Result<impl IntoResponse, Problem> {
     let shared = state.clone();
-    let text = state.blocking(move |_| Ok(metrics::render(&shared))).await?;
+    let text = state.blocking(move |_| Ok(gauges::render(&shared))).await?;
     Ok((
         [(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")],
         text,

@@ -1,21 +1,34 @@
 //! The index and the parameters.
 
 use crate::http::AppState;
+use crate::http::access::Access;
 use crate::http::dto::class::IndexState;
 use crate::http::dto::index::{IndexAnswer, IndexClass, IndexQuery, IndexTotals};
 use crate::http::dto::parameters::{ParametersAnswer, PresetDto};
 use crate::http::dto::{Page, PageQuery};
 use crate::http::extract::ApiQuery;
 use crate::http::problem::Problem;
+use crate::http::problem_sets::PAGE;
+use crate::http::route::Route;
+use crate::model::Scope;
 use crate::model::{Class, ClassId, GenerationClass};
 use crate::store::Store;
 use axum::Json;
 use axum::extract::State;
 use shapelex_core::parameters::{Parameters, Preset};
 use std::collections::BTreeMap;
+use utoipa_axum::routes;
+
+/// The routes of this file: handler, what it demands, the problems of its own.
+pub(super) fn routes() -> Vec<Route> {
+    vec![
+        Route::new(routes!(get_index), Access::Needs(Scope::Read), &[PAGE]),
+        Route::new(routes!(get_parameters), Access::Needs(Scope::Read), &[]),
+    ]
+}
 
 /// The list its cursors belong to.
-const LIST: &str = "index";
+const CURSOR: &str = "index";
 
 /// Show the index
 ///
@@ -29,15 +42,15 @@ pub async fn get_index(
     ApiQuery(query): ApiQuery<IndexQuery>,
 ) -> Result<Json<IndexAnswer>, Problem> {
     let page = PageQuery::from(query);
-    let (limit, after) = (page.limit()?, page.after::<ClassId>(LIST)?);
+    let (limit, after) = (page.limit()?, page.after::<ClassId>(CURSOR)?);
     let live = state.jobs.live_index();
     let classes = state.blocking(|s| all_classes(&s.store)).await?;
     let generation = live.generation.as_ref();
+    let resident = live.resident_bytes_by_class();
     let learnt: BTreeMap<ClassId, (&GenerationClass, usize)> = generation
         .into_iter()
         .flat_map(|g| &g.classes)
-        .zip(&live.index.classes)
-        .map(|(class, indexed)| (class.class, (class, indexed.resident_bytes())))
+        .filter_map(|class| Some((class.class, (class, *resident.get(&class.class)?))))
         .collect();
     let state_of = |class: &Class| IndexState::of_learnt(class, learnt.get(&class.id).map(|(c, _)| *c));
     let mut totals = IndexTotals {
@@ -57,7 +70,7 @@ pub async fn get_index(
         .into_iter()
         .filter(|class| after.is_none_or(|after| class.id > after));
     let page = Page::cut(
-        LIST,
+        CURSOR,
         found.take(limit + 1).collect(),
         limit,
         |class| class.id.to_string(),
@@ -81,7 +94,7 @@ pub async fn get_index(
         not_indexed: names(IndexState::NotIndexed),
         totals,
         bytes,
-        resident_bytes: live.resident_bytes() as u64,
+        resident_bytes: live.search.resident_bytes() as u64,
         next_cursor: page.next_cursor,
         classes: page.items,
     }))

@@ -2,13 +2,17 @@
 
 use super::classes::{find_class, insert};
 use crate::http::AppState;
+use crate::http::access::Access;
 use crate::http::auth::Caller;
 use crate::http::dto::job::{JobDto, JobEvent, ScopeDto, StartReindex};
 use crate::http::dto::{Page, PageQuery};
 use crate::http::extract::{ApiPath, ApiQuery, OptionalJson};
 use crate::http::problem::{Code, Problem};
+use crate::http::problem_sets::{JSON, PAGE, WRITE};
+use crate::http::route::Route;
 use crate::http::state::Parts;
 use crate::jobs::JobError;
+use crate::model::Scope;
 use crate::model::{ContentHash, Job, JobId, JobKind, ReindexScope};
 use axum::Json;
 use axum::extract::State;
@@ -20,6 +24,47 @@ use shapelex_core::parameters::Parameters;
 use std::convert::Infallible;
 use std::sync::PoisonError;
 use tokio_stream::wrappers::WatchStream;
+use utoipa_axum::routes;
+
+/// The routes of this file: handler, what it demands, the problems of its own.
+pub(super) fn routes() -> Vec<Route> {
+    use Code::*;
+    vec![
+        Route::new(
+            routes!(start_reindex),
+            Access::Needs(Scope::Write),
+            &[
+                JSON,
+                WRITE,
+                &[
+                    InvalidRequest,
+                    IdempotencyKeyReused,
+                    InvalidParameter,
+                    ClassNotFound,
+                    NothingToIndex,
+                    QueueFull,
+                    ShuttingDown,
+                ],
+            ],
+        ),
+        Route::new(routes!(list_jobs), Access::Needs(Scope::Read), &[PAGE]),
+        Route::new(
+            routes!(get_job),
+            Access::Needs(Scope::Read),
+            &[&[InvalidRequest, JobNotFound]],
+        ),
+        Route::new(
+            routes!(cancel_job),
+            Access::Needs(Scope::Write),
+            &[WRITE, &[InvalidRequest, JobNotFound, JobFinished]],
+        ),
+        Route::new(
+            routes!(follow_job),
+            Access::Needs(Scope::Read),
+            &[&[InvalidRequest, JobNotFound]],
+        ),
+    ]
+}
 
 /// Start a reindex
 ///

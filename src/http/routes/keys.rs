@@ -2,12 +2,15 @@
 
 use super::classes::insert;
 use crate::http::AppState;
+use crate::http::access::Access;
 use crate::http::auth::Caller;
 use crate::http::dto::key::{CreateKey, CreatedKey, KeyDto};
 use crate::http::dto::{Page, PageQuery};
 use crate::http::extract::{ApiJson, ApiPath, ApiQuery};
 use crate::http::keyring::new_secret;
 use crate::http::problem::{Code, Problem};
+use crate::http::problem_sets::{JSON, PAGE, WRITE};
+use crate::http::route::Route;
 use crate::http::state::Parts;
 use crate::model::key::SECRET_PREFIX;
 use crate::model::{ApiKey, KeyHash, KeyId, KeyName, Scope};
@@ -16,6 +19,25 @@ use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use jiff::Timestamp;
+use utoipa_axum::routes;
+
+/// The routes of this file: handler, what it demands, the problems of its own.
+pub(super) fn routes() -> Vec<Route> {
+    use Code::*;
+    vec![
+        Route::new(
+            routes!(create_key),
+            Access::Owner,
+            &[JSON, WRITE, &[InvalidName, KeyExists, TooManyKeys]],
+        ),
+        Route::new(routes!(list_keys), Access::Owner, &[PAGE]),
+        Route::new(
+            routes!(revoke_key),
+            Access::Owner,
+            &[WRITE, &[InvalidRequest, KeyNotFound, LastAdminKey]],
+        ),
+    ]
+}
 
 /// Make an API key
 ///

@@ -1,28 +1,65 @@
 //! Queries: one mesh, or many as a stream.
 
 use crate::http::AppState;
+use crate::http::access::Access;
 use crate::http::admission::Patience;
-use crate::http::answer::answer;
 use crate::http::auth::Caller;
 use crate::http::batch::Batch;
 use crate::http::dto::query::{BatchLine, QueryAnswer, QueryOptions};
 use crate::http::dto::{Binary, FilesForm};
 use crate::http::extract::ApiQuery;
 use crate::http::limits::Allowance;
+use crate::http::middleware::RequestId;
 use crate::http::poses::Poses;
 use crate::http::problem::{Code, Problem};
 use crate::http::problem_from::index_empty;
-use crate::http::time_limit::TimeLimit;
+use crate::http::problem_sets::{MESH, POOL, STORED, UPLOAD};
+use crate::http::route::Route;
+use crate::http::run_query::run_query;
+use crate::http::stored;
 use crate::http::upload::{self, Upload};
-use crate::http::uploaded::UploadedMesh;
-use crate::http::{respond, stored};
 use crate::jobs::LiveIndex;
+use crate::model::Scope;
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use std::sync::Arc;
-use std::time::Duration;
+use utoipa_axum::routes;
+
+/// The routes of this file: handler, what it demands, the problems of its own.
+pub(super) fn routes() -> Vec<Route> {
+    use Code::*;
+    vec![
+        Route::new(
+            routes!(query_mesh),
+            Access::Needs(Scope::Read),
+            &[
+                UPLOAD,
+                MESH,
+                POOL,
+                &[
+                    OneMeshExpected,
+                    IndexEmpty,
+                    IndexIncomplete,
+                    RecoveryMode,
+                    RateLimited,
+                    NoAnimation,
+                ],
+                STORED,
+            ],
+        ),
+        Route::new(
+            routes!(query_batch),
+            Access::Needs(Scope::Read),
+            &[
+                UPLOAD,
+                STORED,
+                &[IndexEmpty, RecoveryMode, RateLimited, OneMeshExpected],
+            ],
+        ),
+    ]
+}
 
 /// Query with a mesh
 ///
@@ -55,7 +92,7 @@ pub async fn query_mesh(
     let poses = poses_of(&state, &options)?;
     let (live, upload, left) = begin(&state, &caller, &options, request).await?;
     let mesh = poses.only(upload::only_mesh(upload)?)?;
-    let answer = rank(&state, Patience::Bounded, live, mesh, options).await?;
+    let answer = run_query(&state, Patience::Bounded, live, mesh, options).await?;
     let mut response = Json(answer).into_response();
     if let Some(left) = left {
         left.tell(&mut response);
@@ -86,7 +123,7 @@ pub async fn query_batch(
     caller: Caller,
     request: Request,
 ) -> Result<Response, Problem> {
-    let id = respond::id_of(&request);
+    let id = request.extensions().get::<RequestId>().map(|id| id.0.clone());
     let poses = poses_of(&state, &options)?;
     let (live, upload, mut left) = begin(&state, &caller, &options, request).await?;
     let total = upload.meshes.len() * poses.per_file();
@@ -149,38 +186,8 @@ async fn begin(
 fn answerable(state: &AppState) -> Result<Arc<LiveIndex>, Problem> {
     let live = state.jobs.live_index();
     state.require_index()?;
-    if live.index.classes.is_empty() {
+    if live.search.dictionaries.classes.is_empty() {
         return Err(index_empty());
     }
     Ok(live)
-}
-
-pub(in crate::http) async fn rank(
-    state: &AppState,
-    patience: Patience,
-    live: Arc<LiveIndex>,
-    mesh: UploadedMesh,
-    options: QueryOptions,
-) -> Result<QueryAnswer, Problem> {
-    let shared = state.clone();
-    let name = mesh.name.clone();
-    let limit = options
-        .time_limit_ms
-        .map(|milliseconds| TimeLimit::start(Duration::from_millis(milliseconds)));
-    let view = limit.as_ref().map(TimeLimit::view);
-    let answered = state
-        .compute
-        .run(patience, state.config.query_timeout, move |work| {
-            answer(&shared, &live, &mesh, &options, view.as_ref(), work)
-        })
-        .await;
-    drop(limit);
-    if let (Ok(answer), Some(slow)) = (&answered, state.config.slow_query) {
-        let total = answer.timings_ms.get("total").copied().unwrap_or_default();
-        if total >= slow.as_secs_f64() * 1e3 {
-            let timings = serde_json::to_string(&answer.timings_ms).unwrap_or_default();
-            tracing::warn!(target: "shapelex::slow_query", name, milliseconds = total, timings, "slow query");
-        }
-    }
-    answered
 }

@@ -2,6 +2,7 @@
 
 use super::classes::{find_class, insert, is_at_hand};
 use crate::http::AppState;
+use crate::http::access::Access;
 use crate::http::auth::Caller;
 use crate::http::dto::class::ClassDto;
 use crate::http::dto::shape::{ShapeDto, UploadQuery, UploadResult};
@@ -10,9 +11,12 @@ use crate::http::extract::{ApiPath, ApiQuery};
 use crate::http::poses::check_poses;
 use crate::http::problem::{Code, Problem};
 use crate::http::problem_from::recovery_mode;
+use crate::http::problem_sets::{MESH, PAGE, POOL, UPLOAD, WRITE};
 use crate::http::request_memory::file_body;
+use crate::http::route::Route;
 use crate::http::state::Parts;
 use crate::http::{checked, upload};
+use crate::model::Scope;
 use crate::model::{Class, ClassName, NewShape, Shape, ShapeId};
 use crate::store::{AddedShape, StoreError};
 use axum::Json;
@@ -21,6 +25,58 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use std::sync::PoisonError;
 use tokio::io::AsyncReadExt;
+use utoipa_axum::routes;
+
+/// The routes of this file: handler, what it demands, the problems of its own.
+pub(super) fn routes() -> Vec<Route> {
+    use Code::*;
+    vec![
+        Route::new(
+            routes!(create_shapes),
+            Access::Needs(Scope::Write),
+            &[
+                UPLOAD,
+                MESH,
+                POOL,
+                WRITE,
+                &[
+                    InvalidName,
+                    ClassNotFound,
+                    UploadRejected,
+                    NoAnimation,
+                    QuotaExceeded,
+                ],
+            ],
+        ),
+        Route::new(
+            routes!(list_shapes),
+            Access::Needs(Scope::Read),
+            &[PAGE, &[InvalidRequest, ClassNotFound]],
+        ),
+        Route::new(
+            routes!(get_shape),
+            Access::Needs(Scope::Read),
+            &[&[InvalidRequest, ClassNotFound, ShapeNotFound]],
+        ),
+        Route::new(
+            routes!(delete_shape),
+            Access::Needs(Scope::Write),
+            &[WRITE, &[InvalidRequest, ClassNotFound, ShapeNotFound]],
+        ),
+        Route::new(
+            routes!(get_original),
+            Access::Needs(Scope::Read),
+            &[&[
+                InvalidRequest,
+                ClassNotFound,
+                ShapeNotFound,
+                OriginalMissing,
+                OriginalDamaged,
+                StorageDenied,
+            ]],
+        ),
+    ]
+}
 
 /// Upload shapes
 ///

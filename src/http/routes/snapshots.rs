@@ -2,14 +2,18 @@
 
 use super::classes::insert;
 use crate::http::AppState;
+use crate::http::access::Access;
 use crate::http::body::{body_too_large, broke_off, too_late};
 use crate::http::dto::snapshot::{RestoredDto, SnapshotDto};
 use crate::http::dto::{Binary, Page, PageQuery};
 use crate::http::extract::{ApiPath, ApiQuery, media_type};
 use crate::http::problem::{Code, Problem};
+use crate::http::problem_sets::{PAGE, RESTORE, WRITE};
 use crate::http::request_memory::file_body;
+use crate::http::route::Route;
 use crate::http::state::Parts;
 use crate::jobs::JobError;
+use crate::model::Scope;
 use crate::model::{Restored, SnapshotId, SnapshotOrigin};
 use crate::store::StoreError;
 use crate::store::snapshot::Staged;
@@ -24,6 +28,55 @@ use std::sync::PoisonError;
 use std::time::Duration;
 use tokio::io::AsyncWriteExt;
 use tokio::time::Instant;
+use utoipa_axum::routes;
+
+/// The routes of this file: handler, what it demands, the problems of its own.
+pub(super) fn routes() -> Vec<Route> {
+    use Code::*;
+    vec![
+        Route::new(
+            routes!(create_snapshot),
+            Access::Needs(Scope::Admin),
+            &[WRITE, &[SnapshotRunning]],
+        ),
+        Route::new(routes!(list_snapshots), Access::Needs(Scope::Admin), &[PAGE]),
+        Route::new(
+            routes!(get_snapshot),
+            Access::Needs(Scope::Admin),
+            &[&[SnapshotNotFound]],
+        ),
+        Route::new(
+            routes!(delete_snapshot),
+            Access::Needs(Scope::Admin),
+            &[&[SnapshotNotFound]],
+        ),
+        Route::new(
+            routes!(get_snapshot_file),
+            Access::Needs(Scope::Admin),
+            &[&[SnapshotNotFound]],
+        ),
+        Route::new(
+            routes!(restore_snapshot),
+            Access::Owner,
+            &[WRITE, RESTORE, &[SnapshotNotFound]],
+        ),
+        Route::new(
+            routes!(restore_upload),
+            Access::Owner,
+            &[
+                WRITE,
+                RESTORE,
+                &[
+                    EmptyBody,
+                    InvalidRequest,
+                    RequestTimeout,
+                    BodyTooLarge,
+                    UnsupportedMediaType,
+                ],
+            ],
+        ),
+    ]
+}
 
 /// Bytes of a snapshot that must arrive in a second, on average, once the time that any body may take is over.
 const SLOWEST: u64 = 1 << 20;

@@ -6,18 +6,15 @@ pub mod describe;
 pub mod error;
 pub mod estimate;
 pub mod held_out;
-pub mod judge;
 pub mod learn;
 mod near_copies;
 pub mod prepared;
 pub mod stage;
 pub mod views;
 
-pub use crate::ranking::{rank, rank_top};
 pub use describe::{Description, describe_both, describe_plain, describe_query, describe_shape};
 pub use error::PipelineError;
 pub use held_out::{HeldOutScores, held_out_scores};
-pub use judge::{Judged, RankedClass, judge, judged_by};
 pub use learn::{Model, ModelReport, learn_model};
 pub use prepared::PreparedShape;
 pub use stage::{Stage, StageSpan};

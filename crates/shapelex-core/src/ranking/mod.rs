@@ -17,7 +17,7 @@ pub use calibration::{Calibration, HeldOut, Judgement, SIGNIFICANCE};
 pub use error::RankingError;
 pub use index::{Index, IndexedClass, IndexedShape};
 pub use not_judged::NotJudged;
-pub use rank::{ClassScore, Ranking, ShapeScore, rank, rank_top};
+pub use rank::{ClassScore, Ranking, ShapeScore, rank, rank_top, rank_until};
 pub use score::{Errors, PreparedView, Score, prepare_views, score};
 pub use verdict::{Candidate, JUDGED, Verdict, VerdictKind};
 pub use view::View;

@@ -1,9 +1,10 @@
 //! Class scores → ranking.
 
 use super::score::{Score, measure, prepare_views};
-use super::search::{Candidate, Search};
+use super::search::{Candidate, Scored, Search};
 use super::{Index, RankingError, View};
-use crate::cancel::Cancel;
+use crate::cancel::{Cancel, Cancelled};
+use crate::coding::CodingError;
 use crate::parameters::{Hypothesis, RankBy};
 use serde::{Deserialize, Serialize};
 
@@ -61,6 +62,8 @@ pub struct Ranking {
     /// Classes of these that a lower bound of their score left out; the query's signatures were coded under the
     /// dictionaries of the others.
     pub pruned: usize,
+    /// Labels of the classes that there was no time for; empty but for [`rank_until`].
+    pub not_compared: Vec<String>,
 }
 
 /// Codes a query under every dictionary of the index and orders the classes (method, steps 8 to 10; Eq. 5).
@@ -78,13 +81,13 @@ pub fn rank(
     rank_by: RankBy,
     cancel: &Cancel,
 ) -> Result<Ranking, RankingError> {
-    ranking(views, index, rank_by, None, cancel)
+    ranking(views, index, rank_by, Extent::All, cancel)
 }
 
 /// As [`rank`], but only the `top` best classes and shapes, exactly as they stand in the full ranking.
 ///
-/// Among many and ordered by mean objective, most are left out by a lower bound of their score that exceeds the scores
-/// of enough others. By the trimmed objective and by Eq. 5, which have no such bound, all are coded.
+/// Among many, most are left out by a lower bound of their score that exceeds the scores of enough others. Eq. 5 has no
+/// such bound; ranked by it, all are coded.
 ///
 /// # Errors
 /// As [`rank`].
@@ -95,14 +98,58 @@ pub fn rank_top(
     top: usize,
     cancel: &Cancel,
 ) -> Result<Ranking, RankingError> {
-    ranking(views, index, rank_by, Some(top), cancel)
+    ranking(views, index, rank_by, Extent::Top(top), cancel)
+}
+
+/// As [`rank`], but of as many classes as there is time for until `passed` is set, each scored exactly as in [`rank`].
+/// The others are named in [`Ranking::not_compared`], in the order of the index.
+///
+/// # Errors
+/// As [`rank`]; cancelled where not even one class was scored.
+pub fn rank_until(
+    views: &[View],
+    index: &Index,
+    rank_by: RankBy,
+    passed: &Cancel,
+) -> Result<Ranking, RankingError> {
+    ranking(views, index, rank_by, Extent::InTime, passed)
+}
+
+/// How much of the index is ranked.
+#[derive(Clone, Copy)]
+enum Extent {
+    /// All of it.
+    All,
+    /// The best so many.
+    Top(usize),
+    /// What is scored before the flag is set.
+    InTime,
+}
+
+impl Extent {
+    /// How many classes or shapes are answered at most.
+    fn limit(self) -> usize {
+        match self {
+            Self::Top(top) => top,
+            Self::All | Self::InTime => usize::MAX,
+        }
+    }
+
+    fn search(self, search: &Search<'_>, candidates: &[Candidate<'_>]) -> Result<Scored, RankingError> {
+        match self {
+            Self::All => search.best(candidates, None),
+            // One more than asked for, because the last one's margin is against it.
+            Self::Top(top) => search.best(candidates, Some(top.saturating_add(1))),
+            Self::InTime => search.in_time(candidates),
+        }
+    }
 }
 
 fn ranking(
     views: &[View],
     index: &Index,
     rank_by: RankBy,
-    top: Option<usize>,
+    extent: Extent,
     cancel: &Cancel,
 ) -> Result<Ranking, RankingError> {
     if index.classes.is_empty() {
@@ -115,8 +162,6 @@ fn ranking(
         rank_by: measure(&prepared, rank_by),
         cancel,
     };
-    // One more than asked for, because the last one's margin is against it.
-    let wanted = top.map(|top| top.saturating_add(1));
     let candidates: Vec<_> = index
         .classes
         .iter()
@@ -125,7 +170,14 @@ fn ranking(
             dictionaries: &class.dictionaries,
         })
         .collect();
-    let found = search.best(&candidates, wanted)?;
+    let found = extent.search(&search, &candidates)?;
+    if found.is_empty() {
+        return Err(CodingError::Cancelled(Cancelled).into());
+    }
+    let not_compared = match extent {
+        Extent::InTime => left_out(&candidates, &found),
+        Extent::All | Extent::Top(_) => Vec::new(),
+    };
     let mut classes: Vec<ClassScore> = found
         .iter()
         .map(|(i, score)| class_score(candidates[*i].label, score))
@@ -145,8 +197,8 @@ fn ranking(
             (class, candidate)
         })
         .unzip();
-    let mut shapes: Vec<ShapeScore> = search
-        .best(&candidates, wanted)?
+    let mut shapes: Vec<ShapeScore> = extent
+        .search(&search, &candidates)?
         .iter()
         .map(|(i, score)| ShapeScore {
             class: owners[*i].label.clone(),
@@ -158,8 +210,8 @@ fn ranking(
         .collect();
     let coded = classes.len();
     let confidence = classes[0].margin.unwrap_or(1.0);
-    classes.truncate(top.unwrap_or(usize::MAX));
-    shapes.truncate(top.unwrap_or(usize::MAX));
+    classes.truncate(extent.limit());
+    shapes.truncate(extent.limit());
     let signatures = views
         .iter()
         .find(|v| v.hypothesis == Hypothesis::Plain)
@@ -169,9 +221,20 @@ fn ranking(
         shapes,
         confidence,
         signatures,
-        compared: index.classes.len(),
-        pruned: index.classes.len() - coded,
+        compared: index.classes.len() - not_compared.len(),
+        pruned: index.classes.len() - not_compared.len() - coded,
+        not_compared,
     })
+}
+
+/// Labels of the candidates that were not found, in their order.
+fn left_out(candidates: &[Candidate<'_>], found: &Scored) -> Vec<String> {
+    let mut scored = vec![false; candidates.len()];
+    for (i, _) in found {
+        scored[*i] = true;
+    }
+    let left = candidates.iter().zip(scored).filter(|(_, scored)| !scored);
+    left.map(|(candidate, _)| candidate.label.to_owned()).collect()
 }
 
 fn class_score(label: &str, s: &Score) -> ClassScore {

@@ -5,7 +5,7 @@ use super::anchors::anchors;
 use super::bound::{BoundMemory, Level};
 use super::score::{PreparedView, Score, score};
 use crate::cancel::Cancel;
-use crate::coding::Dictionary;
+use crate::coding::{CodingError, Dictionary};
 use crate::parameters::{Channel, RankBy};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -35,6 +35,9 @@ pub(super) struct Search<'a> {
     pub cancel: &'a Cancel,
 }
 
+/// Candidates' numbers and their scores.
+pub(super) type Scored = Vec<(usize, Score)>;
+
 /// A candidate's number and its lower bound.
 type Bounded = (f64, usize);
 
@@ -44,11 +47,7 @@ impl Search<'_> {
     ///
     /// A candidate is left out when a lower bound of its score ([`Level::bound`]) exceeds the score of `wanted` others.
     /// Eq. 5 has no such bound; ranked by it, all are coded.
-    pub fn best(
-        &self,
-        candidates: &[Candidate<'_>],
-        wanted: Option<usize>,
-    ) -> Result<Vec<(usize, Score)>, RankingError> {
+    pub fn best(&self, candidates: &[Candidate<'_>], wanted: Option<usize>) -> Result<Scored, RankingError> {
         let signals = self.views.iter().map(|v| v.matrix().ncols()).min().unwrap_or(0);
         let mut found = match wanted {
             Some(wanted)
@@ -60,8 +59,21 @@ impl Search<'_> {
             }
             _ => self.code(candidates, 0..candidates.len())?,
         };
-        let label = |i: usize| candidates[i].label;
-        found.sort_by(|(i, a), (j, b)| a.value.total_cmp(&b.value).then_with(|| label(*i).cmp(label(*j))));
+        order(&mut found, candidates);
+        Ok(found)
+    }
+
+    /// The candidates' numbers and scores, best first, of those that were scored before the flag was set.
+    pub fn in_time(&self, candidates: &[Candidate<'_>]) -> Result<Scored, RankingError> {
+        let in_time = |i: usize| match self.score(candidates, i) {
+            Err(RankingError::Coding(CodingError::Cancelled(_))) => None,
+            done => Some(done),
+        };
+        let mut found = (0..candidates.len())
+            .into_par_iter()
+            .filter_map(in_time)
+            .collect::<Result<Scored, RankingError>>()?;
+        order(&mut found, candidates);
         Ok(found)
     }
 
@@ -70,7 +82,7 @@ impl Search<'_> {
         candidates: &[Candidate<'_>],
         wanted: usize,
         signals: usize,
-    ) -> Result<Vec<(usize, Score)>, RankingError> {
+    ) -> Result<Scored, RankingError> {
         let sizes = SIZES.map(|size| size.min(signals / 2));
         let anchors: Vec<_> = self
             .views
@@ -98,23 +110,20 @@ impl Search<'_> {
         &self,
         candidates: &[Candidate<'_>],
         numbers: impl Iterator<Item = usize>,
-    ) -> Result<Vec<(usize, Score)>, RankingError> {
+    ) -> Result<Scored, RankingError> {
         numbers
             .collect::<Vec<_>>()
             .into_par_iter()
-            .map(|i| {
-                let Candidate { label, dictionaries } = candidates[i];
-                let score = score(
-                    self.views,
-                    dictionaries,
-                    self.lambda,
-                    self.rank_by,
-                    label,
-                    self.cancel,
-                )?;
-                Ok((i, score))
-            })
+            .map(|i| self.score(candidates, i))
             .collect()
+    }
+
+    /// The number and the score of one candidate.
+    fn score(&self, candidates: &[Candidate<'_>], i: usize) -> Result<(usize, Score), RankingError> {
+        let Candidate { label, dictionaries } = candidates[i];
+        let (lambda, rank_by) = (self.lambda, self.rank_by);
+        let score = score(self.views, dictionaries, lambda, rank_by, label, self.cancel)?;
+        Ok((i, score))
     }
 
     /// Bounds of the numbered candidates, the least first.
@@ -134,6 +143,12 @@ impl Search<'_> {
         bounds.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         Ok(bounds)
     }
+}
+
+/// Puts the best first; equal scores are in the order of their labels.
+fn order(found: &mut Scored, candidates: &[Candidate<'_>]) {
+    let label = |i: usize| candidates[i].label;
+    found.sort_by(|(i, a), (j, b)| a.value.total_cmp(&b.value).then_with(|| label(*i).cmp(label(*j))));
 }
 
 /// The `wanted`-th best score, infinity where there are fewer.

@@ -1,7 +1,8 @@
 //! A ranking and a calibration → what the answer says.
 
-use super::Description;
+use super::RankedClass;
 use crate::parameters::{Parameters, RankBy};
+use crate::pipeline::Description;
 use crate::ranking::{Calibration, Candidate, JUDGED, NotJudged, Verdict};
 
 /// What a ranking by sparse coding can be judged by.
@@ -23,17 +24,6 @@ pub fn judged_by<'a>(
     calibration.as_ref().map_err(|reason| *reason)
 }
 
-/// A class as it stands in a ranking.
-#[derive(Clone, Copy, Debug)]
-pub struct RankedClass<'a> {
-    /// Its label in the index.
-    pub label: &'a str,
-    /// What people call it.
-    pub name: &'a str,
-    /// Its score.
-    pub score: f64,
-}
-
 /// What can be told of a ranking.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judged {
@@ -46,22 +36,22 @@ pub struct Judged {
 }
 
 /// Judges a ranking, best first.
-pub fn judge(calibration: Result<&Calibration, NotJudged>, ranked: &[RankedClass<'_>]) -> Judged {
+pub fn judge(calibration: Result<&Calibration, NotJudged>, ranked: &[RankedClass]) -> Judged {
     let calibration = match calibration {
         Ok(calibration) => calibration,
         Err(reason) => {
             return Judged {
                 p_values: vec![None; ranked.len()],
                 none_of_these: None,
-                verdict: Verdict::not_judged(ranked.first().map(|class| class.name), reason),
+                verdict: Verdict::not_judged(ranked.first().map(|class| class.name.as_str()), reason),
             };
         }
     };
-    let judgement = calibration.judge(ranked.iter().map(|class| (class.label, class.score)));
+    let judgement = calibration.judge(ranked.iter().map(|class| (class.label.as_str(), class.score)));
     let first = ranked.iter().zip(&judgement.p_values).take(JUDGED);
     let candidates: Vec<Candidate<'_>> = first
         .map(|(class, p_value)| Candidate {
-            name: class.name,
+            name: &class.name,
             p_value: *p_value,
         })
         .collect();

@@ -1,0 +1,23 @@
+//! The query: a mesh and an index → classes, ranked and judged. The service, the command line and the benchmarks all
+//! call [`QueryEngine::run`], so that there is one way to answer.
+//!
+//! | step | from | to |
+//! |---|---|---|
+//! | describe | [`TriangleSoup`](crate::mesh::TriangleSoup) | [`Description`](crate::pipeline::Description): eigenpairs, then signatures, M × N per view |
+//! | rank | signatures × dictionaries, or vectors × training shapes | classes and shapes, ordered by score |
+//! | judge | scores and the scores of held-out training shapes | p-values, verdict |
+
+pub mod deadline;
+pub mod engine;
+pub mod error;
+pub mod index;
+pub mod judge;
+pub mod method;
+pub mod outcome;
+
+pub use deadline::{AtDeadline, Deadline};
+pub use engine::{QueryEngine, QuerySpec};
+pub use error::QueryError;
+pub use index::SearchIndex;
+pub use method::RankingMethod;
+pub use outcome::{QueryOutcome, RankedClass, RankedShape};
