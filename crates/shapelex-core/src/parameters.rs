@@ -26,13 +26,13 @@ pub struct ParameterError {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Preset {
-    /// What a newcomer should use: n 200, M 60, unit √WKS, L 128, holes filled, open queries doubled too (method,
-    /// step 10), ranked by objective.
+    /// What a newcomer should use: n 200, M 60, unit √WKS, L 128, holes filled, open queries doubled too
+    /// (docs/method.md#hypotheses), ranked by objective.
     #[default]
     Default,
     /// The paper's literal setting: n 200, M 500, unit WKS, L 500, nothing filled, ranked by Eq. 5.
     Paper,
-    /// `default` with the affine-whitened hypothesis (method, step 10), for stretched shapes.
+    /// `default` with the affine-whitened hypothesis (docs/method.md#hypotheses), for stretched shapes.
     Robust,
     /// `default` with less of most, for answers within some 20 ms: 1000 vertices, n 130, 600
     /// signatures of a training shape and 200 of a query.
@@ -57,15 +57,15 @@ pub enum RankBy {
     Frobenius,
 }
 
-/// A way to prepare a query (method, step 10). Each class keeps its best.
+/// A way to prepare a query (docs/method.md#hypotheses). Each class keeps its best.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Hypothesis {
-    /// H0: as it is.
+    /// As it is.
     Plain,
-    /// H1: whitened by its second moments, so that an affine map of a known mesh is undone.
+    /// Whitened by its second moments, so that an affine map of a known mesh is undone.
     Whitened,
-    /// H2: an open surface doubled along its boundary, its full area guessed.
+    /// An open surface doubled along its boundary, its full area guessed.
     Doubled,
 }
 
@@ -127,7 +127,7 @@ pub struct Parameters {
     pub rank_by: RankBy,
     /// The ways a query is prepared; always starts with plain.
     pub hypotheses: Vec<Hypothesis>,
-    /// Whether every training shape gets a dictionary of its own too (method, step 9).
+    /// Whether every training shape gets a dictionary of its own too (docs/method.md#ranking).
     pub per_shape: bool,
     /// Seed of everything that is random.
     pub seed: u64,

@@ -214,7 +214,7 @@ pub struct QueryAnswer {
     /// The parameters of the index.
     pub parameters: ParametersDto,
     /// The signals that were coded, where `details=samples` asks for them: with the dictionaries of an export, `lambda` and
-    /// `rank_by` a score can be computed outside (method, section 8).
+    /// `rank_by` a score can be computed outside (docs/method.md#ranking).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub samples: Option<Vec<SampledView>>,
     /// Milliseconds by stage: `wait`, `read`, `prepare`, `laplacian`, `eigenpairs`, `signatures`, `ranking` and

@@ -7,7 +7,7 @@ use crate::pipeline::Description;
 use crate::signature::Signatures;
 use faer::Mat;
 
-/// Words of the vocabulary (method, table of results).
+/// Words of the vocabulary (docs/method.md#baselines).
 pub const WORDS: usize = 64;
 /// Signatures of one shape that may take part in finding range and words.
 const THINNED: usize = 120;

@@ -1,4 +1,4 @@
-//! The Lasso of every signal against one dictionary (method, step 6; Eq. 1).
+//! The Lasso of every signal against one dictionary (docs/method.md#coding; Eq. 1).
 
 use super::prepared::Prepared;
 use super::workspace::with_kept;

@@ -1,4 +1,4 @@
-//! Online dictionary learning (method, step 7; Mairal, Bach, Ponce, Sapiro 2010, Algorithms 1 and 2).
+//! Online dictionary learning (docs/method.md#dictionary; Mairal, Bach, Ponce, Sapiro 2010, Algorithms 1 and 2).
 
 use super::columns::Columns;
 use super::dictionary_update::DictionaryUpdate;

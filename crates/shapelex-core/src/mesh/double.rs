@@ -1,4 +1,4 @@
-//! Hypothesis H2: an open surface glued to its mirror image along the boundary.
+//! The doubled hypothesis (docs/method.md#hypotheses): an open surface glued to its mirror image along the boundary.
 
 use super::boundary::boundary_vertices;
 use super::{MeshError, TriMesh};

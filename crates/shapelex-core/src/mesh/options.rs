@@ -13,7 +13,7 @@ pub enum Components {
     All,
 }
 
-/// How a soup becomes a mesh (method, step 1).
+/// How a soup becomes a mesh (docs/method.md#mesh).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PrepareOptions {

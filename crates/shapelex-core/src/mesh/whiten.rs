@@ -1,4 +1,5 @@
-//! Hypothesis H1: the representative of a shape's affine class whose second moments are isotropic.
+//! The whitened hypothesis (docs/method.md#hypotheses): the representative of a shape's affine class whose second
+//! moments are isotropic.
 
 use super::trimesh::face_area;
 use super::{MeshError, TriMesh};

@@ -1,4 +1,4 @@
-//! Spectra → the ways a shape is seen, as one that trains and as a query (method, steps 4, 5 and 9).
+//! Spectra → the ways a shape is seen, as one that trains and as a query (docs/method.md#hypotheses).
 
 use super::prepared::taken_as_part;
 use super::{PipelineError, PreparedShape};
@@ -10,7 +10,7 @@ use crate::signature::descriptor::{Descriptor, DescriptorParameters, WksRange};
 use crate::signature::normalise::normalise;
 use crate::spectral::Eigenpairs;
 
-/// Full area over visible area, as assumed for an open query (method, step 10).
+/// Full area over visible area, as assumed for an open query (docs/method.md#hypotheses).
 pub(super) const AREA_SCALES: [f64; 4] = [2.0, 2.5, 3.0, 4.0];
 /// Energies of the fixed grid.
 pub(super) const FIXED_ENERGIES: usize = 100;

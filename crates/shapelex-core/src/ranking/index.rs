@@ -34,7 +34,7 @@ impl IndexedClass {
     }
 }
 
-/// A training shape with a dictionary of its own (method, step 9).
+/// A training shape with a dictionary of its own (docs/method.md#ranking).
 #[derive(Clone, Debug)]
 pub struct IndexedShape {
     /// Whatever the caller calls it; comes back in the ranking.

@@ -31,7 +31,7 @@ pub struct ClassScore {
     pub margin: Option<f64>,
 }
 
-/// How well one training shape regenerates a query (method, step 9).
+/// How well one training shape regenerates a query (docs/method.md#ranking).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShapeScore {
     /// The class's label in the index.
@@ -66,7 +66,7 @@ pub struct Ranking {
     pub not_compared: Vec<String>,
 }
 
-/// Codes a query under every dictionary of the index and orders the classes (method, steps 8 to 10; Eq. 5).
+/// Codes a query under every dictionary of the index and orders the classes (docs/method.md#ranking; Eq. 5).
 ///
 /// Classes are coded in parallel on the current rayon pool; each is computed on its own, so the result does not depend
 /// on the number of threads. Ties are broken by label, so it does not depend on the order of the index either.

@@ -1,4 +1,4 @@
-//! How well one set of dictionaries regenerates a query (method, steps 8 and 10; Eq. 5).
+//! How well one set of dictionaries regenerates a query (docs/method.md#ranking; Eq. 5).
 
 use super::{RankingError, View};
 use crate::cancel::Cancel;
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// What a class whitened by its second moments must be better by, in units of the mean objective: the prior against
-/// the less specific hypothesis (method, step 10).
+/// the less specific hypothesis (docs/method.md#hypotheses).
 const WHITENED_OFFSET: f64 = 0.0003;
 /// What an open query taken as it is must be better by.
 const OPEN_PLAIN_OFFSET: f64 = 0.001;
@@ -126,7 +126,8 @@ pub struct Score {
 /// Codes every view under the dictionary of its channel and combines the hypotheses.
 ///
 /// With p = min(m₀, m₁ + 0.0003): the score is p, or for an open query min(p + 0.001, m₂), m₂ the soft minimum
-/// −τ ln mean exp(−m/τ) over the areas assumed (method, step 10). Offsets are in units of the mean objective, so a
+/// −τ ln mean exp(−m/τ) over the areas assumed (docs/method.md#hypotheses).
+/// Offsets are in units of the mean objective, so a
 /// ranking by Eq. 5 knows the plain hypothesis only. Views of a surface with a boundary are measured by their trimmed
 /// objective where `rank_by` is the mean one.
 pub fn score(

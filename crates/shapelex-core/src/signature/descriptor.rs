@@ -29,7 +29,8 @@ pub enum WksRange {
     ScaleFree,
     /// The WKS paper's text: σ of 7 steps, the interval shrunk by 2σ at both ends.
     Paper7,
-    /// The same logarithmic energies for every shape, so that spectra of parts can be compared (method, step 10).
+    /// The same logarithmic energies for every shape, so that spectra of parts can be compared
+    /// (docs/method.md#hypotheses).
     Fixed {
         /// First energy, log λ.
         low: f64,

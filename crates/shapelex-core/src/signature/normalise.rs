@@ -1,4 +1,4 @@
-//! Signature → signal (method, step 5).
+//! Signature → signal (docs/method.md#signal).
 
 use super::Signatures;
 use serde::{Deserialize, Serialize};

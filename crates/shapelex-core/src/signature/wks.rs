@@ -1,4 +1,4 @@
-//! Wave Kernel Signature (method, step 4; Aubry, Schlickewei, Cremers 2011, Eq. 8 and 9).
+//! Wave Kernel Signature (docs/method.md#signature; Aubry, Schlickewei, Cremers 2011, Eq. 8 and 9).
 
 use super::descriptor::{DescriptorParameters, Spectrum, WksRange};
 use super::grid::linspace;

@@ -1,4 +1,4 @@
-//! The spectrum of an open surface glued to its mirror copy, without building the copy (method, step 10, H2).
+//! The spectrum of an open surface glued to its mirror copy, without building the copy (docs/method.md#hypotheses).
 //!
 //! On the doubled surface every eigenfunction is even or odd under the mirror. The even ones are the eigenfunctions of
 //! the open surface with its natural (Neumann) boundary, the odd ones those with zero (Dirichlet) boundary values; so

@@ -1,4 +1,4 @@
-//! The n smallest eigenpairs of W φ = λ A φ (method, step 3).
+//! The n smallest eigenpairs of W φ = λ A φ (docs/method.md#eigenpairs).
 
 use super::normalised::Normalised;
 use super::rows::Rows;

@@ -1,4 +1,4 @@
-//! The discrete Laplace-Beltrami operator (method, step 2).
+//! The discrete Laplace-Beltrami operator (docs/method.md#laplacian).
 //!
 //! Cotangent weights (Pinkall and Polthier 1993) with natural boundary conditions and a lumped barycentric mass. An
 //! edge shared by more than two faces sums the contributions of all of them: the result is symmetric and positive

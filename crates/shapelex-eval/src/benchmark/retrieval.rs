@@ -19,7 +19,7 @@ const TOGETHER: usize = 24;
 /// as all do.
 const SIGNATURES: usize = 250;
 
-/// `scores[i][j]`: how badly a dictionary of shape j alone regenerates query i (method, step 9), by at most 250 of its
+/// `scores[i][j]`: how badly a dictionary of shape j alone regenerates query i (docs/method.md#ranking), by at most 250 of its
 /// signatures; the smaller, the more alike. Not symmetric. `progress(done, total)` counts dictionaries and queries.
 ///
 /// # Errors

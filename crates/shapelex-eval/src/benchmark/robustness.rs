@@ -1,4 +1,4 @@
-//! The robustness benchmark's categories and protocols (method, "Protocols").
+//! The robustness benchmark's categories and protocols (docs/evaluation/results.md#robustness-benchmark).
 
 use super::deform::Deformation;
 use super::protocol::Round;

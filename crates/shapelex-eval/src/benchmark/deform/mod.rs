@@ -6,7 +6,7 @@
 //!
 //! The paper gives its strengths by pictures only, but for scale and down-sampling. Ours were chosen once, on twelve
 //! nulls of TOSCA and Sumner, so that area-rescaled Shape DNA scores under `hold` about what the paper reports of it,
-//! and without a look at any other method (docs/evaluation/results.md).
+//! and without a look at any other method (docs/evaluation/results.md#robustness-benchmark).
 
 pub mod geometry;
 pub mod holes;
