@@ -3,6 +3,7 @@
 use super::benchmark_args::{BenchmarkArgs, categories, settings};
 use super::benchmark_cache::{Cache, Key};
 use super::benchmark_nulls::{self, Null};
+use super::output::note_line;
 use super::peak_memory::{peak_bytes, reset_peak};
 use super::progress::Progress;
 use super::{CliError, benchmark_report, figures, output};
@@ -259,7 +260,7 @@ impl Bench<'_> {
                 }
                 Ok(specimen) => described.push(Some(specimen)),
                 Err(reason) => {
-                    eprintln!("shapelex: {class}, {name} {strength}: {reason}; it counts as a wrong answer");
+                    note_line!("shapelex: {class}, {name} {strength}: {reason}; it counts as a wrong answer");
                     described.push(None);
                 }
             }

@@ -3,7 +3,8 @@
 //! Local commands call the very routes a client calls, without a socket in between, so there is one implementation of
 //! uploading, indexing and querying.
 
-use super::outcome::outcome;
+use super::outcome::{outcome, unreachable};
+use super::output::note_line;
 use super::wording::{self, Place};
 use super::{CliError, data_dir, trust};
 use crate::config::{Config, DEFAULT_LISTEN};
@@ -134,7 +135,7 @@ impl OperatorArgs {
         let Some(access) = access() else {
             return Err(opening_failed(&locked));
         };
-        eprintln!(
+        note_line!(
             "shapelex: a service runs on {}; asking it at {}",
             data.display(),
             access.url
@@ -361,7 +362,7 @@ impl Client {
                 if let Some(key) = key {
                     request = request.header("authorization", format!("Bearer {key}"));
                 }
-                let unreachable = |error: ureq::Error| CallError::Unreachable(format!("{base}: {error}"));
+                let unreachable = |error: ureq::Error| unreachable(base, &error);
                 let request = request
                     .body(body)
                     .map_err(|error| CallError::Unreachable(format!("{base}{path}: {error}")))?;

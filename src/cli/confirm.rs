@@ -1,6 +1,6 @@
 //! The question before something is deleted.
 
-use super::CliError;
+use super::{CliError, output};
 use std::io::{IsTerminal, Write};
 
 /// `--yes`.
@@ -35,7 +35,7 @@ impl ConfirmArgs {
             return Ok(());
         }
         self.can_ask()?;
-        eprint!("{what}? [y/N] ");
+        output::note(format_args!("{what}? [y/N] "));
         std::io::stderr().flush()?;
         let mut answer = String::new();
         std::io::stdin().read_line(&mut answer)?;

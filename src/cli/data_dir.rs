@@ -4,6 +4,7 @@
 //! mistyped name. So commands that only read ask first, and the others say what they made.
 
 use super::CliError;
+use super::output::note_line;
 use crate::config::DEFAULT_DATA;
 use crate::store::{Store, StoreError};
 use std::path::{Path, PathBuf};
@@ -64,7 +65,7 @@ pub fn require_place(path: &Path) -> Result<(), CliError> {
 
 /// Says on stderr that a data directory was made.
 pub fn say_made(path: &Path) {
-    eprintln!("shapelex: {}", made(path));
+    note_line!("shapelex: {}", made(path));
 }
 
 /// The same as a sentence.
@@ -75,7 +76,7 @@ pub fn made(path: &Path) -> String {
 /// Says on stderr what was repaired as a data directory was opened.
 pub fn say_repaired(store: &Store) {
     for line in store.recovery() {
-        eprintln!("shapelex: the data directory was repaired: {line}");
+        note_line!("shapelex: the data directory was repaired: {line}");
     }
 }
 

@@ -3,6 +3,7 @@
 use super::client::Client;
 use super::demo_report::{Answer, Summary};
 use super::files::MeshFile;
+use super::output::note_line;
 use super::progress::Progress;
 use super::zoo::{Specimen, ZooFormat, specimens, write};
 use super::{CliError, ParameterArgs, api, ask, data_dir, output, service};
@@ -78,7 +79,7 @@ pub fn run(args: &DemoArgs, json: bool) -> Result<(), CliError> {
     let (data, _temporary) = data_directory(args)?;
     let service = Running::start(config(&data, args.listen))?;
     let url = service.url();
-    eprintln!("service on {url}");
+    note_line!("service on {url}");
     let client = Client::remote(&url, None)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(CONNECTIONS)
@@ -189,18 +190,18 @@ fn print_commands(url: &str, folder: &Path, unseen: &[Specimen]) {
     let example = unseen
         .first()
         .map_or_else(|| folder.to_owned(), |s| folder.join(&s.class).join(&s.name));
-    eprintln!(
+    note_line!(
         "\nThe service stays up until Ctrl-C. Poses it has not seen are in {}",
         folder.display()
     );
-    eprintln!("Try:");
-    eprintln!(
+    note_line!("Try:");
+    note_line!(
         "  curl --data-binary @{} '{url}/v1/query?top=3'",
         example.display()
     );
-    eprintln!("  curl {url}/v1/classes");
-    eprintln!("  curl {url}/v1/index");
-    eprintln!("  open {url}/docs");
+    note_line!("  curl {url}/v1/classes");
+    note_line!("  curl {url}/v1/index");
+    note_line!("  open {url}/docs");
 }
 
 /// The service on a thread of its own.

@@ -228,3 +228,29 @@ fn confusion(outcome: &Outcome) -> String {
         .collect();
     table(&header, &rows)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_open_set_has_a_row_per_level() {
+        let at = |level, count| AtLevel {
+            level,
+            covered: Share { count, total: 20 },
+        };
+        let outcome = OpenSet {
+            by_level: vec![at(0.05, 19), at(0.1, 17)],
+            ..OpenSet::default()
+        };
+        let text = open_set(&outcome);
+        let row = |level: &str| {
+            text.lines()
+                .find(|line| line.trim_start().starts_with(level))
+                .unwrap()
+        };
+        let words = |line: &str| -> Vec<String> { line.split_whitespace().map(str::to_owned).collect() };
+        assert_eq!(words(row("0.05")), ["0.05", "95", "%", "95.0", "%", "19", "20"]);
+        assert_eq!(words(row("0.10")), ["0.10", "90", "%", "85.0", "%", "17", "20"]);
+    }
+}

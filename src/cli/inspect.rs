@@ -1,6 +1,7 @@
 //! `shapelex inspect`: what is read of a file, what cleaning did, how its spectrum begins.
 
 use super::files::MeshFile;
+use super::output::note_line;
 use super::query_inputs::gather;
 use super::refused::Refused;
 use super::values::poses;
@@ -67,7 +68,7 @@ pub fn run(args: &InspectArgs, json: bool) -> Result<(), CliError> {
             Ok(inspections) => {
                 for inspection in inspections {
                     for warning in &inspection.report.warnings {
-                        eprintln!("shapelex: {}: {warning}", inspection.title());
+                        note_line!("shapelex: {}: {warning}", inspection.title());
                     }
                     if json {
                         output::json(&inspection)?;

@@ -2,6 +2,7 @@
 
 use super::client::{Client, OperatorArgs, Payload};
 use super::encode::encode;
+use super::output::note_line;
 use super::{CliError, listing, output};
 use crate::model::KeyName;
 use jiff::{SignedDuration, Timestamp};
@@ -108,7 +109,7 @@ fn create(args: &CreateArgs, json: bool) -> Result<(), CliError> {
     if json {
         return output::json(&made);
     }
-    eprintln!("shapelex: this is the only time the key is shown");
+    note_line!("shapelex: this is the only time the key is shown");
     output::line(made["secret"].as_str().unwrap_or_default())
 }
 

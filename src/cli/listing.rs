@@ -79,12 +79,40 @@ pub fn tell(as_json: bool, value: &Value, line: impl FnOnce() -> String) -> Resu
     }
 }
 
+/// A moment without the fraction of its second.
+fn to_the_second(text: &str) -> String {
+    match text.split_once('.') {
+        Some((seconds, fraction)) => {
+            let zone = fraction.trim_start_matches(|c: char| c.is_ascii_digit());
+            format!("{seconds}{zone}")
+        }
+        None => text.to_owned(),
+    }
+}
+
 /// A member as text.
 pub fn cell(item: &Value, member: &str) -> String {
     let value = member.split('.').fold(item, |value, part| &value[part]);
     match value {
         Value::Null => String::new(),
+        Value::String(text) if member.ends_with("_at") => to_the_second(text),
         Value::String(text) => text.replace('_', if member.ends_with("state") { " " } else { "_" }),
         other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_are_shown_to_the_second() {
+        for (moment, shown) in [
+            ("2026-11-29T04:53:43.585819186Z", "2026-11-29T04:53:43Z"),
+            ("2026-11-29T04:53:43.5+01:00", "2026-11-29T04:53:43+01:00"),
+            ("2026-11-29T04:53:43Z", "2026-11-29T04:53:43Z"),
+        ] {
+            assert_eq!(cell(&serde_json::json!({ "made_at": moment }), "made_at"), shown);
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! `shapelex man` and `shapelex completions`: what shells and `man` want to know of the commands.
 
-use super::{Cli, CliError, output};
-use clap::CommandFactory;
+use super::parse::command;
+use super::{CliError, output};
 use clap_complete::Shell;
 use std::path::PathBuf;
 
@@ -28,11 +28,11 @@ pub struct CompletionsArgs {
 pub fn man(args: &ManArgs, as_json: bool) -> Result<(), CliError> {
     let Some(dir) = &args.out else {
         let mut page = Vec::new();
-        clap_mangen::Man::new(Cli::command()).render(&mut page)?;
+        clap_mangen::Man::new(command()).render(&mut page)?;
         return output::bytes(&page);
     };
     std::fs::create_dir_all(dir).map_err(|error| CliError::at(dir, error))?;
-    let command = Cli::command().disable_help_subcommand(true);
+    let command = command().disable_help_subcommand(true);
     let pages = pages(&command);
     clap_mangen::generate_to(command, dir).map_err(|error| CliError::at(dir, error))?;
     if as_json {
@@ -53,6 +53,6 @@ fn pages(command: &clap::Command) -> usize {
 /// [`CliError::OutputClosed`] where nobody reads.
 pub fn completions(args: &CompletionsArgs) -> Result<(), CliError> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "shapelex", &mut script);
+    clap_complete::generate(args.shell, &mut command(), "shapelex", &mut script);
     output::bytes(&script)
 }

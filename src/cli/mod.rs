@@ -72,6 +72,7 @@ pub use parameters::ParameterArgs;
 
 use crate::telemetry::{self, LogFormat};
 use clap::{Parser, Subcommand};
+use output::note_line;
 use parse::ParseError;
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -142,8 +143,8 @@ pub enum Command {
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let cli = match parse::parse(args) {
         Ok(cli) => cli,
-        Err(ParseError::Environment(line)) => {
-            eprintln!("shapelex: {line}");
+        Err(ParseError::Line(line)) => {
+            note_line!("shapelex: {line}");
             return ExitCode::from(error::USAGE);
         }
         Err(ParseError::Clap(error)) => {
@@ -160,7 +161,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(()) => ExitCode::from(error::OK),
         Err(error) => {
             if let Some(message) = error.message() {
-                eprintln!("{message}");
+                note_line!("{message}");
             }
             error.exit_code()
         }

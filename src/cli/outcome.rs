@@ -21,6 +21,25 @@ fn refusal(problem: &Value, status: &str) -> CallError {
     }
 }
 
+/// The error of a service that does not answer.
+pub(super) fn unreachable(base: &str, error: &ureq::Error) -> CallError {
+    let text = match error {
+        ureq::Error::Io(io) if io.kind() == std::io::ErrorKind::ConnectionRefused => format!(
+            "no service answers at {base} (connection refused); `shapelex serve` starts one, --server URL names another"
+        ),
+        ureq::Error::Io(io) => format!("{base}: {io}"),
+        other => format!("{base}: {other}"),
+    };
+    let hint = if text.contains("invalid peer certificate") {
+        "; --ca-cert FILE says which certificate to trust"
+    } else if text.contains("invalid HTTP version") && base.starts_with("http:") {
+        "; the service may speak TLS, try https:// instead of http://"
+    } else {
+        ""
+    };
+    CallError::Unreachable(format!("{text}{hint}"))
+}
+
 impl Client {
     /// Sends a request whose answer is lines of JSON.
     ///

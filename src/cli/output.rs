@@ -1,4 +1,4 @@
-//! Answers on stdout: lines and tables for people, one JSON value per line for machines.
+//! Answers on stdout: lines and tables for people, one JSON value per line for machines. Notes on stderr.
 
 use super::CliError;
 use comfy_table::{CellAlignment, ContentArrangement, Table, TableComponent, presets};
@@ -15,6 +15,19 @@ pub fn line(text: &str) -> Result<(), CliError> {
     stdout.flush()?;
     Ok(())
 }
+
+/// Writes to stderr. Where nothing reads it the text is lost and the command goes on; `eprintln!` would panic.
+pub fn note(text: std::fmt::Arguments<'_>) {
+    let _ = std::io::stderr().lock().write_fmt(text);
+}
+
+/// Writes a line to stderr as [`note`] does; arguments as for `format!`.
+macro_rules! note_line {
+    ($($text:tt)*) => {
+        $crate::cli::output::note(format_args!("{}\n", format_args!($($text)*)))
+    };
+}
+pub(super) use note_line;
 
 /// Writes bytes to stdout as they are.
 ///

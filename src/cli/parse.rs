@@ -1,8 +1,10 @@
 //! Arguments → [`Cli`]: which of flag and environment counts, and whose mistake a wrong value is.
 
 use super::Cli;
+use crate::config::Config;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, Command, CommandFactory, FromArgMatches};
+use serde_json::Value;
 use std::error::Error;
 use std::ffi::OsString;
 
@@ -16,8 +18,8 @@ const NO_VARIABLE: &str = "";
 pub enum ParseError {
     /// Help, the version or a mistake, as clap says it.
     Clap(clap::Error),
-    /// A wrong value of an environment variable, as one line.
-    Environment(String),
+    /// A wrong value of a flag or an environment variable, as one line.
+    Line(String),
 }
 
 /// Parses the arguments. A place named by a flag wins over one that the environment names.
@@ -26,16 +28,33 @@ pub enum ParseError {
 /// [`ParseError`].
 pub fn parse(args: impl IntoIterator<Item = OsString>) -> Result<Cli, ParseError> {
     let args: Vec<OsString> = args.into_iter().collect();
-    let mut command = Cli::command();
+    let mut command = command();
     if PLACES.iter().any(|place| names(&args, place)) {
         command = without_environment(command, &args);
     }
-    let told = |error: clap::Error| match of_environment(&error, &args) {
-        Some(line) => ParseError::Environment(line),
+    let told = |error: clap::Error| match of_environment(&error, &args).or_else(|| of_flag(&error)) {
+        Some(line) => ParseError::Line(line),
         None => ParseError::Clap(error),
     };
     let matches = command.try_get_matches_from(&args).map_err(told)?;
     Cli::from_arg_matches(&matches).map_err(told)
+}
+
+/// The command line, with the defaults of the service's settings in the help. The settings themselves have none there,
+/// so that the environment and a file are asked first.
+pub fn command() -> Command {
+    let defaults = serde_json::to_value(Config::default()).unwrap_or_default();
+    Cli::command().mut_subcommand("serve", |serve| {
+        serve.mut_args(|arg| {
+            let default = match &defaults[arg.get_id().as_str()] {
+                Value::String(text) if !text.is_empty() => text.clone(),
+                number @ Value::Number(_) => number.to_string(),
+                _ => return arg,
+            };
+            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+            arg.help(format!("{help} [default: {default}]"))
+        })
+    })
 }
 
 /// Whether the arguments have a flag.
@@ -90,12 +109,38 @@ fn of_environment(error: &clap::Error, args: &[OsString]) -> Option<String> {
             };
             Some(format!("{variable}='{value}': {expected}"))
         }
-        _ => {
-            let reason = error
-                .source()
-                .map_or_else(|| "this value is wrong".to_owned(), ToString::to_string);
-            Some(format!("{variable}='{value}': {reason}"))
+        _ => Some(format!("{variable}='{value}': {}", reason(error))),
+    }
+}
+
+/// The line about a value that a flag cannot have; `None` where it is another mistake.
+fn of_flag(error: &clap::Error) -> Option<String> {
+    if error.kind() != ErrorKind::ValueValidation {
+        return None;
+    }
+    let text = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.as_str()),
+        _ => None,
+    };
+    let flag = text(ContextKind::InvalidArg)?.split([' ', '=', '[']).next()?;
+    let value = text(ContextKind::InvalidValue)?;
+    Some(format!("{flag} '{value}': {}", reason(error)))
+}
+
+/// What was expected of a value, in words for people.
+fn reason(error: &clap::Error) -> String {
+    let said = error.source().map(ToString::to_string).unwrap_or_default();
+    match said.as_str() {
+        "" => "this value is wrong".to_owned(),
+        "invalid digit found in string" | "cannot parse integer from empty string" => {
+            "expected a whole number, 0 or more".to_owned()
         }
+        "number too large to fit in target type" => "the number is too large".to_owned(),
+        "invalid socket address syntax" => {
+            "expected an IP address and a port, such as 127.0.0.1:7345".to_owned()
+        }
+        "invalid float literal" => "expected a number".to_owned(),
+        _ => said,
     }
 }
 
@@ -141,6 +186,42 @@ mod tests {
         assert!(names(&args(&["shapelex", "query", "--data=d"]), "data"));
         assert!(!names(&args(&["shapelex", "query", "--database"]), "data"));
         assert!(!names(&args(&["shapelex", "query", "--", "--data"]), "data"));
+    }
+
+    #[test]
+    fn a_wrong_value_is_told_in_words() {
+        let told = |list: &[&str]| match parse(args(list)) {
+            Err(ParseError::Line(line)) => line,
+            Err(ParseError::Clap(error)) => error.to_string(),
+            Ok(_) => String::new(),
+        };
+        assert_eq!(
+            told(&["shapelex", "serve", "--listen", "here"]),
+            "--listen 'here': expected an IP address and a port, such as 127.0.0.1:7345"
+        );
+        for wrong in ["x", "-1", "1.5", ""] {
+            assert_eq!(
+                told(&["shapelex", "serve", &format!("--max-vertices={wrong}")]),
+                format!("--max-vertices '{wrong}': expected a whole number, 0 or more")
+            );
+        }
+    }
+
+    #[test]
+    fn the_help_has_the_defaults_of_settings() {
+        let mut command = command();
+        let help = command
+            .find_subcommand_mut("serve")
+            .unwrap()
+            .render_help()
+            .to_string();
+        for default in [
+            "[default: 127.0.0.1:7345]",
+            "[default: shapelex-data]",
+            "[default: 64]",
+        ] {
+            assert!(help.contains(default), "{default}: {help}");
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! How far long work is: a bar where stderr is a terminal, a plain line every few seconds where it is not.
 
+use super::output::note_line;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::Mutex;
@@ -112,7 +113,7 @@ impl Progress {
 
     fn print(&self, lines: &Lines) {
         let (done, total) = (lines.done, lines.total);
-        eprintln!(
+        note_line!(
             "{}: {done} of {total}, {:.0} s",
             self.label,
             lines.began.elapsed().as_secs_f64()
@@ -125,11 +126,11 @@ impl Progress {
             Shown::Bar(bar) => {
                 let (done, seconds) = (bar.position(), bar.elapsed().as_secs_f64());
                 bar.finish_and_clear();
-                eprintln!("{}: {done}, {seconds:.1} s", self.label);
+                note_line!("{}: {done}, {seconds:.1} s", self.label);
             }
             Shown::Lines(lines) => {
                 let lines = lines.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-                eprintln!(
+                note_line!(
                     "{}: {}, {:.1} s",
                     self.label,
                     lines.done,

@@ -5,6 +5,7 @@ use super::confirm::ConfirmArgs;
 use super::encode::encode;
 use super::files::MeshFile;
 use super::folders::LabelledFile;
+use super::output::note_line;
 use super::{CliError, listing};
 use serde::Serialize;
 use serde_json::Value;
@@ -50,7 +51,7 @@ pub fn prune(client: &Client, files: &[LabelledFile], confirm: ConfirmArgs) -> R
         let (name, id) = (listing::cell(&class, "name"), listing::cell(&class, "id"));
         let path = format!("/v1/classes/{}", encode(&id));
         let Some(contents) = there.get(name.as_str()) else {
-            eprintln!("no longer there: class {name} with {} shapes", class["shapes"]);
+            note_line!("no longer there: class {name} with {} shapes", class["shapes"]);
             paths.push(path);
             pruned.classes.push(name);
             continue;
@@ -60,7 +61,7 @@ pub fn prune(client: &Client, files: &[LabelledFile], confirm: ConfirmArgs) -> R
                 continue;
             }
             let (label, id) = (listing::cell(&shape, "name"), listing::cell(&shape, "id"));
-            eprintln!("no longer there: shape {label} of class {name}");
+            note_line!("no longer there: shape {label} of class {name}");
             paths.push(format!("{path}/shapes/{}", encode(&id)));
             pruned.shapes.push(PrunedShape {
                 class: name.clone(),

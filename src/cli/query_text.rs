@@ -1,6 +1,7 @@
 //! A query's answer as text, and what is to be said beside it.
 
 use super::output;
+use super::output::note_line;
 use super::verdict::{self, typicality};
 use serde::Deserialize;
 use serde_json::Value;
@@ -81,7 +82,7 @@ pub fn text(path: &Path, answer: &Value) -> String {
 /// Says on stderr what should be known about the mesh, each thing once.
 pub fn warn(path: &Path, answer: &Value) {
     for warning in warnings(answer) {
-        eprintln!("shapelex: {}: {warning}", path.display());
+        note_line!("shapelex: {}: {warning}", path.display());
     }
 }
 

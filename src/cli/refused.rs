@@ -1,5 +1,6 @@
 //! Inputs that could not be used: said at once on stderr, collected for the answer.
 
+use super::output::note_line;
 use serde::Serialize;
 use std::path::Path;
 
@@ -28,6 +29,6 @@ impl Refused {
 
     /// Says so on stderr.
     pub fn warn(&self) {
-        eprintln!("shapelex: {}: {}", self.file, self.reason);
+        note_line!("shapelex: {}: {}", self.file, self.reason);
     }
 }

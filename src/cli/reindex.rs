@@ -1,6 +1,7 @@
 //! `shapelex reindex`: learns the dictionaries of shapes that are there.
 
 use super::client::TargetArgs;
+use super::output::note_line;
 use super::{CliError, ParameterArgs, api, listing};
 use serde_json::{Value, json};
 
@@ -75,7 +76,7 @@ pub fn warn_of_failed_shapes(job: &Value) -> Result<(), CliError> {
         .map(Vec::as_slice)
         .unwrap_or_default();
     for shape in failed {
-        eprintln!(
+        note_line!(
             "shapelex: shape {} of class {} was left out: {}",
             listing::cell(shape, "shape"),
             listing::cell(shape, "class"),

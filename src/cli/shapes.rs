@@ -16,15 +16,14 @@ const COLUMNS: [Column; 6] = [
     (">vertices", "report.vertices"),
     ("id", "id"),
 ];
-const DETAILS: [Column; 9] = [
+const DETAILS: [Column; 8] = [
     ("name", "name"),
     ("id", "id"),
     ("pose", "pose.label"),
     ("format", "format"),
     ("bytes", "bytes"),
     ("hash", "hash"),
-    ("vertices as read", "report.input_vertices"),
-    ("vertices", "report.vertices"),
+    ("mesh", "report.summary"),
     ("made", "created_at"),
 ];
 

@@ -122,6 +122,12 @@ async fn receive(request: Request) -> Result<bytes::Bytes, Problem> {
 }
 
 fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
+    if body.trim_ascii().is_empty() {
+        return Err(Problem::new(
+            Code::InvalidJson,
+            "the body is empty; send a JSON object with 'content-type: application/json'",
+        ));
+    }
     // serde would read a list as the fields of a struct in their order; the API promises objects.
     if body.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'[') {
         return Err(Problem::new(
@@ -140,7 +146,8 @@ fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
 fn refused(body: &[u8], path: &str, error: &serde_json::Error) -> Problem {
     let text = error.to_string();
     // The place has members of its own.
-    let reason = text.split(" at line ").next().unwrap_or_default();
+    let said = text.split(" at line ").next().unwrap_or_default();
+    let reason = in_words(said);
     let (line, column) = (error.line(), error.column());
     // A field of the wrong type reads as bad syntax where another was expected.
     let is_json = serde_json::from_slice::<serde::de::IgnoredAny>(body).is_ok();
@@ -155,6 +162,36 @@ fn refused(body: &[u8], path: &str, error: &serde_json::Error) -> Problem {
     problem.with("line", line).with("column", column)
 }
 
+/// What the deserialiser says, in the words of the API: what was expected, and what was found.
+fn in_words(said: &str) -> String {
+    let plain = |text: &str| text.replace('`', "'");
+    let listed = |rest: &str| {
+        let names = rest.trim_start_matches("expected ").trim_start_matches("one of ");
+        names.replace('`', "").replace(" or ", ", ")
+    };
+    if let Some(rest) = said.strip_prefix("unknown field ") {
+        let (field, known) = rest.split_once(", ").unwrap_or((rest, ""));
+        return match known.starts_with("expected") {
+            true => format!("there is no field {}; there are {}", plain(field), listed(known)),
+            false => format!("there is no field {}", plain(field)),
+        };
+    }
+    if let Some(rest) = said.strip_prefix("unknown variant ") {
+        let (value, known) = rest.split_once(", ").unwrap_or((rest, ""));
+        return format!("expected one of {}, found {}", listed(known), plain(value));
+    }
+    if let Some(field) = said.strip_prefix("missing field ") {
+        return format!("the field {} is missing", plain(field));
+    }
+    let wrong = ["invalid type: ", "invalid value: ", "invalid length "];
+    if let Some(rest) = wrong.iter().find_map(|wrong| said.strip_prefix(wrong))
+        && let Some((found, expected)) = rest.rsplit_once(", expected ")
+    {
+        return format!("expected {}, found {}", plain(expected), plain(found));
+    }
+    said.to_owned()
+}
+
 /// For fields that are objects: refuses the lists serde would read as their fields in order.
 pub(super) fn object<'de, D, T>(deserializer: D) -> Result<Option<T>, D::Error>
 where
@@ -167,4 +204,36 @@ where
         serde_path_to_error::deserialize(serde_json::Value::Object(map)).map_err(serde::de::Error::custom)
     })
     .transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::http::dto::class::CreateClass;
+    use crate::http::dto::job::StartReindex;
+
+    fn refused<T: DeserializeOwned>(body: &str) -> String {
+        parse::<T>(body.as_bytes()).map(drop).unwrap_err().detail
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_field_is_said_without_the_deserialisers_words() {
+        assert_eq!(
+            refused::<CreateClass>("{\"nam\": \"x\"}"),
+            "nam: there is no field 'nam'; there are name"
+        );
+        assert_eq!(
+            refused::<CreateClass>("{\"name\": 7}"),
+            "name: expected a string, found integer '7'"
+        );
+        assert_eq!(
+            refused::<CreateClass>("{}"),
+            "the body: the field 'name' is missing"
+        );
+        assert_eq!(
+            refused::<StartReindex>("{\"preset\": \"quick\"}"),
+            "preset: expected one of default, paper, robust, fast, found 'quick'"
+        );
+        assert!(refused::<CreateClass>(" ").starts_with("the body is empty"));
+    }
 }

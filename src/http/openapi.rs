@@ -49,6 +49,7 @@ pub fn document(routes: Vec<Route>) -> utoipa::openapi::OpenApi {
             for (_, operation) in operations_of(item) {
                 describe_problems(operation, &route.info);
                 describe_access(operation, route.info.access);
+                describe_body(operation);
             }
         }
         for (path, item) in route.paths.paths {
@@ -86,6 +87,17 @@ fn describe_keys(document: &mut utoipa::openapi::OpenApi) {
     let header = ApiKeyValue::with_description("X-API-Key", "The same key in a header of its own");
     components.add_security_scheme("bearer", SecurityScheme::Http(bearer));
     components.add_security_scheme("api_key", SecurityScheme::ApiKey(ApiKey::Header(header)));
+}
+
+/// Says that a query of a stored shape has no body.
+fn describe_body(operation: &mut Operation) {
+    let is_query = matches!(
+        operation.operation_id.as_deref(),
+        Some("query_mesh" | "query_batch")
+    );
+    if let Some(RefOr::T(body)) = operation.request_body.as_mut().filter(|_| is_query) {
+        body.required = None;
+    }
 }
 
 /// Says what an operation demands of its caller.

@@ -42,6 +42,12 @@ impl Operations {
         self.0.values().flatten().map(AsRef::as_ref)
     }
 
+    /// The methods that an address answers.
+    pub fn methods_of(&self, path: &str) -> Vec<&str> {
+        let of_path = self.0.get(path).into_iter().flatten();
+        of_path.map(|info| info.method.as_str()).collect()
+    }
+
     /// What a request asks for, by its method and the address that matched. `HEAD` is answered by the operation of `GET`.
     pub fn matching(&self, method: &Method, path: Option<&str>) -> Matched {
         let Some(path) = path else { return Matched::Nothing };

@@ -154,6 +154,7 @@ impl std::fmt::Display for Expected {
             } => write!(f, "a whole number from {least} to {most}"),
             Self::Integer { least, .. } => write!(f, "a whole number, {} or more", least.unwrap_or(0)),
             Self::Boolean => f.write_str("true or false"),
+            Self::OneOf(values) if values.len() == 1 => f.write_str(&values[0]),
             Self::OneOf(values) => write!(f, "one of {}", values.join(", ")),
             Self::Text => f.write_str("text"),
         }

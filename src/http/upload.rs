@@ -127,8 +127,8 @@ async fn receive_raw(
         return Err(Problem::new(
             Code::UnsupportedMediaType,
             format!(
-                "'{declared}' is not read here; send model/obj, model/gltf+json, model/gltf-binary, model/stl, \
-                 application/octet-stream, an archive (application/zip, application/x-tar, application/gzip) or \
+                "'{declared}' is not read here; send model/obj, model/gltf+json, model/gltf-binary, model/stl, model/ply, \
+                 model/off, application/octet-stream, an archive (application/zip, application/x-tar, application/gzip) or \
                  multipart/form-data"
             ),
         ));

@@ -55,7 +55,13 @@ fn a_service_behind_tls_is_trusted_by_its_own_certificate_only() {
     assert_eq!(trusted.stdout, b"alive\n");
     let unknown = run(dir.path(), &["health", "--server", &url]);
     assert_eq!(unknown.status.code(), Some(1));
-    assert!(stderr(&unknown).contains(&url), "{}", stderr(&unknown));
+    let told = stderr(&unknown);
+    assert!(told.contains(&url) && told.contains("--ca-cert FILE"), "{told}");
+    let plain = run(
+        dir.path(),
+        &["health", "--server", &url.replace("https:", "http:")],
+    );
+    assert_eq!(plain.status.code(), Some(1), "{}", stderr(&plain));
     std::fs::write(dir.path().join("none.pem"), "no certificate").unwrap();
     for file in ["none.pem", "missing.pem"] {
         let wrong = run(dir.path(), &["health", "--server", &url, "--ca-cert", file]);

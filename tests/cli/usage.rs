@@ -342,3 +342,19 @@ fn completions_and_manual_pages_name_every_command() {
         "{query}"
     );
 }
+
+#[test]
+fn a_reader_that_leaves_ends_nothing_in_a_panic() {
+    use std::process::Stdio;
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("a.obj"), "no mesh").unwrap();
+    let mut child = crate::shapelex(dir.path())
+        .args(["inspect", "a.obj", "b.obj", "c.obj"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stderr.take());
+    drop(child.stdout.take());
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+}

@@ -48,7 +48,9 @@ async fn the_document_and_the_route_table_agree_on_every_method() {
             let routed = answer.status != 405;
             assert_eq!(routed, described, "{method} {path} answered {}", answer.status);
             if !routed {
-                answer.fails(405, "method_not_allowed");
+                let problem = answer.fails(405, "method_not_allowed");
+                let detail = problem["detail"].as_str().unwrap();
+                assert!(detail.starts_with("this address answers "), "{detail}");
                 assert!(!answer.header("allow").is_empty(), "{method} {path}");
             } else if answer.status.as_u16() >= 400 {
                 // Whatever failed, it is a problem the document knows for this operation.
@@ -61,6 +63,19 @@ async fn the_document_and_the_route_table_agree_on_every_method() {
                 );
             }
         }
+    }
+}
+
+#[test]
+fn a_query_of_a_stored_shape_needs_no_body() {
+    let document = document();
+    for (path, required) in [
+        ("/v1/query", false),
+        ("/v1/query/batch", false),
+        ("/v1/shapes", true),
+    ] {
+        let body = &document["paths"][path]["post"]["requestBody"];
+        assert_eq!(body["required"] == true, required, "{path}");
     }
 }
 
