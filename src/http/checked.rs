@@ -47,7 +47,7 @@ pub(super) async fn shapes_of(
     for (outcome, name) in outcomes.into_iter().zip(names.iter()) {
         match outcome {
             Ok(found) => shapes.push(found),
-            // A full house or a fault is about the service, not about the file.
+            // Overload and faults are about the service, not about the file.
             Err(problem) if problem.code.status().is_server_error() => return Err(problem),
             Err(problem) => failures.push((name.clone(), problem)),
         }

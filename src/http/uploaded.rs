@@ -163,7 +163,7 @@ impl UploadedMesh {
         Ok(ReadMesh { format, pose, soup })
     }
 
-    /// The mesh once per pose. The poses are read now, so that a file is read once however many of its poses are ranked.
+    /// The mesh once per pose. All poses are read now, so that the file is read only once.
     ///
     /// # Errors
     /// As [`read_poses`](Self::read_poses).

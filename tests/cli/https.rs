@@ -71,7 +71,7 @@ fn a_service_behind_tls_is_trusted_by_its_own_certificate_only() {
 }
 
 #[test]
-fn the_service_on_a_data_directory_is_reached_whatever_its_certificate_names() {
+fn the_service_on_a_data_directory_is_reached_where_its_certificate_names_another_host() {
     let dir = tempfile::tempdir().unwrap();
     let service = Service::start(dir.path(), &["--data", "d"]);
     let (url, _) = secure_service(&["shapes.example"]);
