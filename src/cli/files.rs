@@ -1,6 +1,7 @@
 //! Mesh files on disk, with the buffers they refer to.
 
 use super::CliError;
+use shapelex_core::memory::MemoryBudget;
 use shapelex_core::mesh::gltf::external_buffers;
 use shapelex_core::mesh::{Companion, Source};
 use std::io::Read;
@@ -47,7 +48,9 @@ impl MeshFile {
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut left = max_bytes.saturating_sub(bytes.len());
         let mut companions = Vec::new();
-        for uri in external_buffers(&bytes) {
+        let memory = MemoryBudget::unlimited().reservation();
+        let buffers = external_buffers(&bytes, &memory).map_err(|error| CliError::at(path, error))?;
+        for uri in buffers {
             let Some(beside) = uri.candidates().map(|p| folder.join(p)).find(|p| p.is_file()) else {
                 continue;
             };

@@ -50,13 +50,14 @@ pub fn answer(
     let ReadMesh { format, pose, soup } = mesh
         .read_posture(&context)
         .map_err(|problem| in_time(problem, limit))?;
-    let threads = state.config.query_threads;
-    context.memory.grow(QueryEngine::bytes(index, &soup, threads))?;
     let spec = QuerySpec {
         method: rank_by.method(),
         top: options.top,
     };
-    let engine = QueryEngine { observer: &observer };
+    let engine = QueryEngine {
+        observer: &observer,
+        memory: Some(&context.memory),
+    };
     let outcome = engine
         .run(index, soup, &spec, &deadline)
         .map_err(|error| match error {

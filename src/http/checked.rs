@@ -90,7 +90,7 @@ fn check_one(
     options: &PrepareOptions,
 ) -> Result<Vec<NewShape>, Problem> {
     // Shared by all poses.
-    let companions = mesh.companions();
+    let companions = mesh.companions(context)?;
     let shape = |format, pose, soup: TriangleSoup| -> Result<NewShape, Problem> {
         let (_, mut report) = prepare_within(soup, options, &context.cancel, &context.memory)?;
         report.warnings.splice(0..0, context.warnings.list());

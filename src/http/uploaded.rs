@@ -121,7 +121,7 @@ impl UploadedMesh {
     pub fn read(&self, context: &ReadContext) -> Result<(Format, TriangleSoup), Problem> {
         let (format, soup) = {
             let _floor = context.memory.hold(self.reading_bytes())?;
-            let companions = self.companions();
+            let companions = self.companions(context)?;
             shapelex_core::mesh::read_within(&self.source(&companions), context)?
         };
         context.memory.grow(soup_bytes(&soup))?;
@@ -212,7 +212,7 @@ impl UploadedMesh {
     pub fn read_poses(&self, poses: usize, context: &ReadContext) -> Result<(Format, Vec<Pose>), Problem> {
         let (format, poses) = {
             let _floor = context.memory.hold(self.reading_bytes())?;
-            let companions = self.companions();
+            let companions = self.companions(context)?;
             shapelex_core::mesh::read_poses_within(&self.source(&companions), poses, context)?
         };
         let bytes = poses.iter().map(|pose| soup_bytes(&pose.soup)).sum();
@@ -234,19 +234,22 @@ impl UploadedMesh {
     ///
     /// A buffer is looked for from the mesh's own folder or, since browsers send names without folders, by its last
     /// part alone.
-    pub fn companions(&self) -> Vec<Companion> {
+    ///
+    /// # Errors
+    /// `mesh_too_large` or `overloaded` where memory is short.
+    pub fn companions(&self, context: &ReadContext) -> Result<Vec<Companion>, Problem> {
         let buffers = match &self.buffers {
-            Buffers::Stored(companions) => return companions.clone(),
-            Buffers::Sent(buffers) if buffers.is_empty() => return Vec::new(),
+            Buffers::Stored(companions) => return Ok(companions.clone()),
+            Buffers::Sent(buffers) if buffers.is_empty() => return Ok(Vec::new()),
             Buffers::Sent(buffers) => buffers,
         };
-        external_buffers(&self.bytes)
+        let found = external_buffers(&self.bytes, &context.memory)?
             .into_iter()
             .filter_map(|uri| {
                 let part = uri.find(&self.folder, buffers, Part::place, |part| !part.packed)?;
                 Some(Companion::new(uri.path(), part.bytes.clone()))
-            })
-            .collect()
+            });
+        Ok(found.collect())
     }
 }
 

@@ -12,7 +12,7 @@ use shapelex_core::memory::{MemoryBudget, MemoryError};
 use shapelex_core::mesh::{self, Companion, Format, Limits, ReadContext, Source, TriangleSoup};
 use shapelex_core::parameters::Parameters;
 use shapelex_core::pipeline::estimate::{self, Role};
-use shapelex_core::pipeline::{Description, PipelineError, StageSpan, describe_shape};
+use shapelex_core::pipeline::{Description, PipelineError, StageSpan, Within, describe_shape_within};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -171,7 +171,13 @@ impl Describer<'_> {
 
     fn describe(&self, shape: &Shape, soup: TriangleSoup) -> Result<Description, Failure> {
         let stages = StageSpan::default();
-        let description = describe_shape(soup, self.parameters, self.cancel, &|stage| stages.begin(stage))?;
+        // What a mesh that is no surface takes is known only now.
+        let memory = MemoryBudget::new(self.share.bytes).reservation();
+        let within = Within {
+            cancel: self.cancel,
+            memory: &memory,
+        };
+        let description = describe_shape_within(soup, self.parameters, within, &|stage| stages.begin(stage))?;
         drop(stages);
         let kept = self
             .store

@@ -1,6 +1,7 @@
 //! Soup → welded faces without slivers, degenerate or duplicate ones, of the components that are kept.
 
 use super::components::{Selection, select};
+use super::lost::merge_lost;
 use super::noise::weld_noise;
 use super::repair::{repair, slivers};
 use super::sliver::may_be_sliver;
@@ -35,8 +36,9 @@ pub(super) struct Cleaned {
 ///
 /// In this order: unused vertices go; coincident vertices are welded ([`weld`]), and those that differ in the file's last
 /// digit where the faces fit together only then ([`weld_noise`]); slivers are taken out without opening the surface
-/// ([`repair`]); faces with a repeated vertex, with area below 1e-12 of the total or collinear up to rounding go; of faces
-/// with the same three vertices the first stays; components are selected ([`select`]); vertices nothing uses any more go.
+/// ([`repair`]); faces with area below 1e-12 of the total or collinear up to rounding are closed where they join others
+/// ([`merge_lost`]), the rest of them and faces with a repeated vertex go; of faces with the same three vertices the first
+/// stays; components are selected ([`select`]); vertices nothing uses any more go.
 /// Vertices and faces keep their order.
 ///
 /// Errors: [`MeshError::NoFaces`], [`MeshError::IndexOutOfRange`], [`MeshError::NotFinite`] for soups that break
@@ -181,8 +183,17 @@ fn filter_faces(
         take_out_slivers(vertices, faces, report, work)?;
         measure(vertices, faces, &mut areas, work)?;
     }
-    let before = faces.len();
     let threshold = NO_AREA * areas.iter().sum::<f64>();
+    let is_lost = |area: f64| area <= 0.0 || area < threshold;
+    if areas.iter().any(|area| is_lost(*area)) {
+        let is_lost = |f: &[u32; 3]| is_lost(proper_area(vertices, f).0);
+        let vanished = merge_lost(vertices, faces, &is_lost, work)?;
+        if vanished > 0 {
+            report.repaired_faces += vanished;
+            measure(vertices, faces, &mut areas, work)?;
+        }
+    }
+    let before = faces.len();
     retain(faces, &mut areas, |_, _, area| area > 0.0 && area >= threshold);
     report.degenerate_faces += before - faces.len();
     if faces.is_empty() {

@@ -1,8 +1,11 @@
 //! Undirected edges of a triangle list, sorted by how many faces meet there.
 
-use super::MeshError;
+use super::components::DisjointSets;
 use super::sort::sort;
 use super::work::{Unwatched, Watch, Work};
+use super::{MeshError, TriMesh};
+use crate::cancel::Cancel;
+use crate::memory::Reservation;
 
 /// Half-edges at one vertex from which on their sort is one that can be stopped.
 const LARGE_BUCKET: usize = 1 << 16;
@@ -147,6 +150,29 @@ pub(super) fn count_edges(
     })?;
     counts.irregular = borders.iter().filter(|&&b| b > 2).count() + counts.non_manifold;
     Ok(counts)
+}
+
+/// How many changes a mesh is away from a surface that can be drawn in the plane: its handles, the edges of more than two
+/// faces, and the vertices at which more than two boundary edges meet. The square root of it bounds how large the separators
+/// of the mesh are, and so what a factor of its Laplacian takes.
+///
+/// # Errors
+/// [`MeshError::Cancelled`], [`MeshError::Memory`].
+pub fn separator_excess(mesh: &TriMesh, cancel: &Cancel, memory: &Reservation) -> Result<usize, MeshError> {
+    let work = Work { cancel, memory };
+    let (v, f) = (mesh.vertices().len(), mesh.faces().len());
+    let counts = count_edges(v, mesh.faces(), work)?;
+    let _sets = work.hold(v, 4)?;
+    let mut sets = DisjointSets::new(v);
+    for (i, face) in mesh.faces().iter().enumerate() {
+        work.look(i)?;
+        sets.union(face[0], face[1]);
+        sets.union(face[0], face[2]);
+    }
+    let parts = (0..v as u32).filter(|x| sets.find(*x) == *x).count();
+    // Half of 2 − χ for each part: a hole in the surface counts as half a handle.
+    let handles = (2 * parts + counts.edges).saturating_sub(v + f) / 2;
+    Ok(handles + counts.irregular)
 }
 
 impl EdgeCensus {

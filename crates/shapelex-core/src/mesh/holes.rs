@@ -8,13 +8,16 @@ use super::work::{Watch, Work};
 /// A fan face below this share of the total area is not added, as the cleaning would drop it.
 const NO_AREA: f64 = 1e-12;
 
+/// Vertices for each loop of a surface with holes, at least.
+const VERTICES_OF_LOOP: usize = 4;
+
 /// Closes every boundary loop with a perimeter below `below` · √area by a fan around the mean of its vertices, and
 /// returns how many were closed. `boundary` are the edges of one face ([`edge_census`](super::edges::edge_census)).
 ///
 /// The new vertices are appended, so the indices of the old ones stay. The area is that before anything is closed.
 /// Fan faces run against their neighbours' direction, as on a consistently oriented surface. A loop whose whole fan
-/// has no area (a slit) stays, and so do all where there are more loops than vertices: in a tangle of faces they bound
-/// no holes, and their centres would be most of the mesh.
+/// has no area (a slit) stays, and so do all where there is more than one loop for four vertices: in a tangle of faces, or
+/// between many faces at one edge, they bound no holes, and their centres would be a large part of the mesh.
 ///
 /// # Errors
 /// [`MeshError::Cancelled`], [`MeshError::Memory`].
@@ -31,7 +34,7 @@ pub(super) fn fill_small_holes(
     let area: f64 = faces.iter().map(|f| face_area(vertices, f)).sum();
     let mut filled = 0;
     let loops = boundary_loops(vertices, boundary, &work)?;
-    if loops.len() > vertices.len() {
+    if loops.len() > vertices.len() / VERTICES_OF_LOOP {
         return Ok(0);
     }
     for (i, edges) in loops.into_iter().enumerate() {

@@ -1,7 +1,6 @@
 //! The faces around slivers, and the two changes that take a sliver out.
 
 use super::MeshError;
-use super::boundary::distance;
 use super::sliver::{Shape, shape};
 use super::work::{Watch, Work};
 use crate::memory::Held;
@@ -24,19 +23,28 @@ const MORE_VISITS: usize = 1 << 25;
 pub(super) enum Outcome {
     /// Its vertices were joined to the faces around.
     Joined,
-    /// It joined nothing and was taken out.
-    Loose,
+    /// It joined nothing and was taken out, with others on its line.
+    Loose { faces: usize },
     /// It could not be taken out.
     Blocked,
 }
 
 /// How far a change may go.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Allowed {
+pub(super) enum Allowed {
     /// Edges with two faces stay edges with two faces.
     Manifold,
     /// A new edge may be where there is one already.
     SharedEdges,
+}
+
+/// How many of the slivers near a line are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reach {
+    /// All that edges of others lead to.
+    Connected,
+    /// Only one.
+    Single,
 }
 
 /// A sliver in the queue, the longest first, ties by place. Stale where the face has other corners now.
@@ -44,17 +52,17 @@ type Entry = (u64, Reverse<[u32; 3]>, Reverse<u32>);
 
 /// Vertices are numbered by place, and the faces of each are known: of the slivers' vertices all, of others some.
 pub(super) struct Patch<'a> {
-    vertices: Vec<[f64; 3]>,
+    pub(super) vertices: Vec<[f64; 3]>,
     /// Index in the mesh of each vertex here.
     origin: Vec<u32>,
     /// Whether all faces of a vertex are in the patch.
-    complete: Vec<bool>,
-    faces_of: Vec<Vec<u32>>,
-    faces: Vec<Option<[u32; 3]>>,
+    pub(super) complete: Vec<bool>,
+    pub(super) faces_of: Vec<Vec<u32>>,
+    pub(super) faces: Vec<Option<[u32; 3]>>,
     /// Index in the mesh of each face here; those beyond are new.
     place: Vec<u32>,
     queue: BinaryHeap<Entry>,
-    visits: usize,
+    pub(super) visits: usize,
     work: Work<'a>,
     _held: (Held<'a>, Held<'a>),
 }
@@ -186,7 +194,7 @@ impl<'a> Patch<'a> {
         }
     }
 
-    fn remove(&mut self, face: u32) {
+    pub(super) fn remove(&mut self, face: u32) {
         if let Some(corners) = self.faces[face as usize].take() {
             for v in corners {
                 let list = &mut self.faces_of[v as usize];
@@ -202,19 +210,34 @@ impl<'a> Patch<'a> {
         self.enter(face, corners);
     }
 
+    /// Puts other faces in a face's place.
+    pub(super) fn replace_by(&mut self, face: u32, others: Vec<[u32; 3]>) {
+        self.remove(face);
+        for (i, corners) in others.into_iter().enumerate() {
+            if i == 0 {
+                self.replace(face, corners);
+            } else {
+                self.add(corners);
+            }
+        }
+    }
+
     fn take_out(&mut self, face: u32, allowed: Allowed) -> Outcome {
         let Some(corners) = self.faces[face as usize] else {
             return Outcome::Blocked;
         };
         match shape(&self.vertices, &corners).0 {
             Shape::Sound => Outcome::Blocked,
-            Shape::Cap { base, corner } => self.open_cap(face, base, corner, allowed),
+            Shape::Cap { base } => match self.open_cap(face, base, Reach::Connected, allowed) {
+                Outcome::Blocked => self.open_cap(face, base, Reach::Single, allowed),
+                outcome => outcome,
+            },
             Shape::Needle { edge } => self.close_needle(edge),
         }
     }
 
     /// The faces that have both vertices; `None` where they are not all known.
-    fn sharing(&mut self, a: u32, b: u32) -> Option<Vec<u32>> {
+    pub(super) fn sharing(&mut self, a: u32, b: u32) -> Option<Vec<u32>> {
         let list = match (self.complete[a as usize], self.complete[b as usize]) {
             (true, true) if self.faces_of[a as usize].len() > self.faces_of[b as usize].len() => b,
             (true, _) => a,
@@ -235,85 +258,7 @@ impl<'a> Patch<'a> {
             .find(|v| *v != a && *v != b)
     }
 
-    /// Makes the corner a vertex of all other faces at the base: each is split in two.
-    fn open_cap(&mut self, cap: u32, [a, b]: [u32; 2], corner: u32, allowed: Allowed) -> Outcome {
-        let (Some(base), Some(left), Some(right)) = (
-            self.sharing(a, b),
-            self.sharing(a, corner),
-            self.sharing(b, corner),
-        ) else {
-            return Outcome::Blocked;
-        };
-        if left.len() == 1 && right.len() == 1 {
-            self.remove(cap);
-            return Outcome::Loose;
-        }
-        let others: Vec<u32> = base.into_iter().filter(|f| *f != cap).collect();
-        let apexes: Vec<u32> = others.iter().filter_map(|f| self.apex(*f, a, b)).collect();
-        if !self.is_progress([a, b], corner, &apexes) {
-            return Outcome::Blocked;
-        }
-        let mut twins = Vec::new();
-        for &apex in &apexes {
-            let Some(between) = self.sharing(corner, apex) else {
-                return Outcome::Blocked;
-            };
-            let folded: Vec<u32> = between
-                .iter()
-                .copied()
-                .filter(|f| *f != cap && self.apex(*f, corner, apex).is_some_and(|v| v == a || v == b))
-                .collect();
-            if folded.iter().any(|f| !self.is_sliver(*f)) {
-                return Outcome::Blocked;
-            }
-            // Of the two halves each that is folded vanishes together with its twin.
-            if between.len() > 2 * folded.len() && allowed == Allowed::Manifold {
-                return Outcome::Blocked;
-            }
-            twins.extend(folded);
-        }
-        self.remove(cap);
-        for other in others {
-            self.split(other, [a, b], corner, &twins);
-        }
-        Outcome::Joined
-    }
-
-    /// Whether there are fewer caps after the faces of an edge have been split at the corner of a cap, or as many with
-    /// shorter edges. Needles do not count, as closing one leaves a vertex less: so this comes to an end.
-    fn is_progress(&self, [a, b]: [u32; 2], corner: u32, apexes: &[u32]) -> bool {
-        let is_cap = |f: [u32; 3]| usize::from(matches!(shape(&self.vertices, &f).0, Shape::Cap { .. }));
-        let before: usize = 1 + apexes.iter().map(|d| is_cap([a, b, *d])).sum::<usize>();
-        let after: usize = apexes
-            .iter()
-            .map(|d| is_cap([a, corner, *d]) + is_cap([corner, b, *d]))
-            .sum();
-        let length = |v: u32, w: u32| distance(&self.vertices[v as usize], &self.vertices[w as usize]);
-        let shorter = apexes.iter().all(|d| length(corner, *d) < length(a, b));
-        after < before || (after == before && shorter)
-    }
-
-    /// Splits a face at a corner on its edge. A half that is there already vanishes together with it.
-    fn split(&mut self, face: u32, [a, b]: [u32; 2], corner: u32, twins: &[u32]) {
-        let Some(corners) = self.faces[face as usize] else {
-            return;
-        };
-        self.remove(face);
-        for gone in [b, a] {
-            let half = corners.map(|v| if v == gone { corner } else { v });
-            let twin = twins
-                .iter()
-                .copied()
-                .find(|t| self.faces[*t as usize].is_some_and(|f| sorted(f) == sorted(half)));
-            match twin {
-                Some(twin) => self.remove(twin),
-                None if self.faces[face as usize].is_none() => self.replace(face, half),
-                None => self.add(half),
-            }
-        }
-    }
-
-    fn is_sliver(&self, face: u32) -> bool {
+    pub(super) fn is_sliver(&self, face: u32) -> bool {
         self.faces[face as usize].is_some_and(|f| shape(&self.vertices, &f).0 != Shape::Sound)
     }
 
@@ -381,7 +326,8 @@ struct Neighbours {
     on_border: bool,
 }
 
-fn sorted(mut face: [u32; 3]) -> [u32; 3] {
+/// The corners of a face in ascending order.
+pub(super) fn sorted(mut face: [u32; 3]) -> [u32; 3] {
     face.sort_unstable();
     face
 }

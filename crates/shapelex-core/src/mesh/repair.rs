@@ -1,9 +1,9 @@
 //! Taking slivers out of a mesh without opening it.
 //!
 //! A face with three different vertices and no area still joins its neighbours: programs write such *caps* where a vertex
-//! of one face lies on the edge of another. To drop one slits the surface open. Here the corner of a cap is made a vertex
-//! of the faces on the other side of its longest edge instead (an edge flip where there is one such face), and a *needle*
-//! is closed by merging the two ends of its shortest edge.
+//! of one face lies on the edge of another. To drop one slits the surface open. Here the caps of one line are taken out
+//! together, and the faces beside them are split at their vertices ([`line`](super::line)); a *needle* is closed by merging
+//! the two ends of its shortest edge.
 
 use super::MeshError;
 use super::patch::{MOST_FACES, Outcome, Patch};
@@ -57,8 +57,8 @@ pub(super) fn slivers(vertices: &[[f64; 3]], faces: &[[u32; 3]], work: Work) -> 
 ///
 /// Where a surface was closed it stays so, and where it was a manifold as well, if that is possible at all: modulo 2 the
 /// edges of one face stay the same. A sliver whose removal would fold a face with an area onto another stays, and so do
-/// some where caps lie on the edges of many other caps, and all where more than half a million faces touch them, or where
-/// vertices of many faces would make it slow. The order of vertices and faces does not matter: slivers are taken by length
+/// all where more than half a million faces touch them, or where vertices of many faces would make it slow; what has no area
+/// of these is closed by merging corners ([`merge_lost`](super::lost::merge_lost)). The order of vertices and faces does not matter: slivers are taken by length
 /// and place.
 ///
 /// # Errors
@@ -81,7 +81,9 @@ pub(super) fn repair(
         let mut steps = 0;
         patch.run(|outcome| {
             steps += 1;
-            loose += usize::from(outcome == Outcome::Loose);
+            if let Outcome::Loose { faces } = outcome {
+                loose += faces;
+            }
         })?;
         patch.finish(faces);
         left = slivers(vertices, faces, work)?;

@@ -2,7 +2,7 @@
 
 /// A cap is lower than this share of its longest edge. Real meshes have caps from 9e-4 on; the eigen-solve fails for some
 /// from 1.5e-6 down.
-const CAP: f64 = 1e-4;
+pub(super) const CAP: f64 = 1e-4;
 
 /// The foot of a cap's height is this many heights away from both ends of the longest edge.
 const OBTUSE: f64 = 10.0;
@@ -15,8 +15,8 @@ const NEEDLE: f64 = 1e-6;
 pub(super) enum Shape {
     /// Not too thin.
     Sound,
-    /// `corner` lies on the edge between the `base`, up to a small share of its length.
-    Cap { base: [u32; 2], corner: u32 },
+    /// The third corner lies on the edge between the `base`, up to a small share of its length.
+    Cap { base: [u32; 2] },
     /// The two ends of `edge` are nearly one.
     Needle { edge: [u32; 2] },
 }
@@ -69,10 +69,7 @@ fn thin_shape(vertices: &[[f64; 3]], face: &[u32; 3]) -> Shape {
             edge: opposite(short),
         }
     } else if height <= CAP * CAP * longest && foot > OBTUSE * OBTUSE * height {
-        Shape::Cap {
-            base: opposite(long),
-            corner: corners[long],
-        }
+        Shape::Cap { base: opposite(long) }
     } else {
         Shape::Sound
     }
@@ -130,10 +127,7 @@ mod tests {
     fn caps_and_needles_are_told_from_thin_faces() {
         let base = [[0.0; 3], [2.0, 0.0, 0.0]];
         let with = |corner: [f64; 3]| shape(&[base[0], base[1], corner], &[0, 1, 2]).0;
-        let cap = Shape::Cap {
-            base: [0, 1],
-            corner: 2,
-        };
+        let cap = Shape::Cap { base: [0, 1] };
         for height in [0.0, 1e-15, 1e-7, 1.9e-4] {
             assert_eq!(with([0.7, height, 0.0]), cap, "{height}");
             assert_eq!(with([0.01, height, 0.0]), cap, "{height}");

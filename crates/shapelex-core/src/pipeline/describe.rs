@@ -1,7 +1,10 @@
 //! Mesh → signatures, for training shapes and for queries.
 
-use super::{PipelineError, PreparedShape, Stage};
+use super::estimate::Role;
+use super::prepared::CleanShape;
+use super::{PipelineError, PreparedShape, Stage, Within};
 use crate::cancel::Cancel;
+use crate::memory::MemoryBudget;
 use crate::mesh::{PrepareReport, TriangleSoup};
 use crate::parameters::{Hypothesis, Parameters};
 use crate::ranking::View;
@@ -17,6 +20,15 @@ pub struct Description {
     pub eigenvalues: Vec<f64>,
 }
 
+/// Calls a function with memory that is not limited.
+fn unlimited<T>(cancel: &Cancel, describe: impl FnOnce(Within<'_>) -> T) -> T {
+    let memory = MemoryBudget::unlimited().reservation();
+    describe(Within {
+        cancel,
+        memory: &memory,
+    })
+}
+
 /// Describes a training shape: one view per channel of the parameters, `samples_per_shape` signatures each.
 ///
 /// The vertices are drawn by area with the parameters' seed, so equal meshes give equal signatures.
@@ -29,8 +41,25 @@ pub fn describe_shape(
     cancel: &Cancel,
     observer: &dyn Fn(Stage),
 ) -> Result<Description, PipelineError> {
-    let shape = PreparedShape::new(soup, parameters, cancel, observer)?;
-    let views = shape.training_views(parameters, cancel)?;
+    unlimited(cancel, |within| {
+        describe_shape_within(soup, parameters, within, observer)
+    })
+}
+
+/// As [`describe_shape`], for a caller that grants memory.
+///
+/// # Errors
+/// As [`describe_shape`], and [`MeshError::Memory`](crate::mesh::MeshError::Memory).
+pub fn describe_shape_within(
+    soup: TriangleSoup,
+    parameters: &Parameters,
+    within: Within<'_>,
+    observer: &dyn Fn(Stage),
+) -> Result<Description, PipelineError> {
+    let clean = CleanShape::new(soup, parameters, Role::Training, within, observer)?;
+    let _held = within.memory.hold(clean.bytes(parameters, within)?)?;
+    let shape = clean.solve(parameters, within.cancel, observer)?;
+    let views = shape.training_views(parameters, within.cancel)?;
     Ok(shape.into_description(views))
 }
 
@@ -45,8 +74,25 @@ pub fn describe_query(
     cancel: &Cancel,
     observer: &dyn Fn(Stage),
 ) -> Result<Description, PipelineError> {
-    let mut shape = PreparedShape::query(soup, parameters, cancel, observer)?;
-    let views = shape.query_views(parameters, cancel)?;
+    unlimited(cancel, |within| {
+        describe_query_within(soup, parameters, within, observer)
+    })
+}
+
+/// As [`describe_query`], for a caller that grants memory.
+///
+/// # Errors
+/// As [`describe_query`], and [`MeshError::Memory`](crate::mesh::MeshError::Memory).
+pub fn describe_query_within(
+    soup: TriangleSoup,
+    parameters: &Parameters,
+    within: Within<'_>,
+    observer: &dyn Fn(Stage),
+) -> Result<Description, PipelineError> {
+    let clean = CleanShape::new(soup, parameters, Role::Query, within, observer)?;
+    let _held = within.memory.hold(clean.bytes(parameters, within)?)?;
+    let mut shape = clean.solve(parameters, within.cancel, observer)?;
+    let views = shape.query_views(parameters, within.cancel)?;
     Ok(shape.into_description(views))
 }
 
@@ -62,9 +108,26 @@ pub fn describe_plain(
     cancel: &Cancel,
     observer: &dyn Fn(Stage),
 ) -> Result<Description, PipelineError> {
+    unlimited(cancel, |within| {
+        describe_plain_within(soup, parameters, within, observer)
+    })
+}
+
+/// As [`describe_plain`], for a caller that grants memory.
+///
+/// # Errors
+/// As [`describe_plain`], and [`MeshError::Memory`](crate::mesh::MeshError::Memory).
+pub fn describe_plain_within(
+    soup: TriangleSoup,
+    parameters: &Parameters,
+    within: Within<'_>,
+    observer: &dyn Fn(Stage),
+) -> Result<Description, PipelineError> {
     let mut parameters = parameters.clone();
     parameters.hypotheses.retain(|h| *h != Hypothesis::Whitened);
-    let shape = PreparedShape::new(soup, &parameters, cancel, observer)?;
+    let clean = CleanShape::new(soup, &parameters, Role::Training, within, observer)?;
+    let _held = within.memory.hold(clean.bytes(&parameters, within)?)?;
+    let shape = clean.solve(&parameters, within.cancel, observer)?;
     let views = vec![shape.training_plain(&parameters)?];
     Ok(shape.into_description(views))
 }

@@ -2,6 +2,7 @@
 
 use crate::cancel::Cancelled;
 use crate::coding::CodingError;
+use crate::memory::MemoryError;
 use crate::mesh::MeshError;
 use crate::parameters::ParameterError;
 use crate::ranking::RankingError;
@@ -42,6 +43,12 @@ impl From<MeshError> for PipelineError {
             MeshError::Cancelled(c) => Self::Cancelled(c),
             other => Self::Mesh(other),
         }
+    }
+}
+
+impl From<MemoryError> for PipelineError {
+    fn from(error: MemoryError) -> Self {
+        Self::Mesh(error.into())
     }
 }
 

@@ -85,12 +85,16 @@ pub fn description_bytes(vertices: usize, parameters: &Parameters, role: Role) -
     F64 * (values * signatures(vertices, parameters, role)) as u64
 }
 
-/// Bytes at the peak of describing a mesh of so many vertices as read, from its Laplacian on.
+/// Bytes at the peak of describing a mesh of so many vertices as read, from its Laplacian on, where it is a surface.
+pub fn describing_bytes(vertices: usize, parameters: &Parameters, role: Role) -> u64 {
+    prepared_describing_bytes(prepared_vertices(vertices, parameters), parameters, role)
+}
+
+/// As [`describing_bytes`], for the vertices of a prepared mesh.
 ///
 /// Plain and whitened spectra are solved for at the same time; then the doubled one beside both, whose vectors are
 /// spread over all vertices, merged and scaled. A spectrum is cut to the eigenpairs of a channel by a copy.
-pub fn describing_bytes(vertices: usize, parameters: &Parameters, role: Role) -> u64 {
-    let v = prepared_vertices(vertices, parameters);
+pub fn prepared_describing_bytes(v: usize, parameters: &Parameters, role: Role) -> u64 {
     let has = |hypothesis| parameters.hypotheses.contains(&hypothesis);
     let n = parameters.eigenpairs;
     let most = match has(Hypothesis::Doubled) {
@@ -113,6 +117,19 @@ pub fn describing_bytes(vertices: usize, parameters: &Parameters, role: Role) ->
     let squares = F64 * samples * most as u64 + vectors(most);
     let views = description_bytes(v, parameters, role);
     SMALL + MESH * v as u64 + first.max(kept + doubled.max(2 * vectors(most) + squares + views))
+}
+
+/// Bytes that factors take beyond those of a surface, for a mesh of so many prepared vertices and an excess of separators
+/// ([`separator_excess`](crate::mesh::edges::separator_excess)).
+///
+/// A graph of n vertices that is x changes away from a plane one is cut in two by some 3 √(x n) vertices, whose block of
+/// the factor is dense, and by no more than all. The factor is held twice while it is packed, and two are made at a time.
+pub fn factor_excess_bytes(vertices: usize, excess: usize, parameters: &Parameters) -> u64 {
+    let (n, x) = (vertices as u64, excess as u64);
+    let separator = n.min(((9 * x).saturating_mul(n) as f64).sqrt() as u64);
+    let alone = parameters.hypotheses.iter().all(|h| *h == Hypothesis::Plain);
+    let factors = if alone { 1 } else { 2 };
+    factors * 2 * F64 * separator * separator / 2
 }
 
 /// Bytes of a dictionary that is ready to code: atoms at both precisions, and both matrices of their products.

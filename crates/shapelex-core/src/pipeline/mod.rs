@@ -11,10 +11,15 @@ mod near_copies;
 pub mod prepared;
 pub mod stage;
 pub mod views;
+pub mod within;
 
-pub use describe::{Description, describe_both, describe_plain, describe_query, describe_shape};
+pub use describe::{
+    Description, describe_both, describe_plain, describe_plain_within, describe_query, describe_query_within,
+    describe_shape, describe_shape_within,
+};
 pub use error::PipelineError;
 pub use held_out::{HeldOutScores, held_out_scores};
 pub use learn::{Model, ModelReport, learn_model};
 pub use prepared::PreparedShape;
 pub use stage::{Stage, StageSpan};
+pub use within::Within;

@@ -1,11 +1,14 @@
 //! A clean mesh and its spectra, from which every view is taken.
 
-use super::{Description, PipelineError, Stage};
+use super::estimate::{self, Role};
+use super::{Description, PipelineError, Stage, Within};
 use crate::cancel::Cancel;
+use crate::memory::MemoryBudget;
 use crate::mesh::boundary::{boundary_vertices, smooth_boundary};
+use crate::mesh::edges::separator_excess;
 use crate::mesh::refine::refine_until;
 use crate::mesh::whiten::whiten;
-use crate::mesh::{PrepareReport, TriMesh, TriangleSoup, prepare_until};
+use crate::mesh::{PrepareReport, TriMesh, TriangleSoup, prepare_within};
 use crate::parameters::{Hypothesis, Parameters};
 use crate::ranking::View;
 use crate::signature::sample::sample_by_area;
@@ -37,64 +40,67 @@ pub fn taken_as_part(report: &PrepareReport, parameters: &Parameters) -> bool {
     report.is_open() && parameters.hypotheses.contains(&Hypothesis::Doubled)
 }
 
-/// A mesh with the spectra its views are taken from.
+/// A mesh whose spectra can be solved for.
 #[derive(Clone, Debug)]
-pub struct PreparedShape {
+pub(super) struct CleanShape {
     mesh: TriMesh,
-    operators: Operators,
-    pub(super) eigenpairs: Eigenpairs,
-    /// Of the whitened mesh, where it is wanted. Without it a query can still be compared.
-    pub(super) whitened: Option<Result<Eigenpairs, PipelineError>>,
-    pub(super) report: PrepareReport,
+    report: PrepareReport,
+    role: Role,
 }
 
-impl PreparedShape {
-    /// Cleans a mesh and solves for its spectrum; with the whitened hypothesis also for the whitened mesh's, at the
-    /// same time where the thread pool has room. For a training shape, which may be a query too.
+impl CleanShape {
+    /// Cleans a mesh, and refines one that is too coarse.
     ///
     /// # Errors
-    /// The error of the stage that failed, or [`PipelineError::Cancelled`].
+    /// [`PipelineError::Mesh`], [`PipelineError::Cancelled`].
     pub fn new(
         soup: TriangleSoup,
         parameters: &Parameters,
-        cancel: &Cancel,
-        observer: &dyn Fn(Stage),
-    ) -> Result<Self, PipelineError> {
-        Self::solve(soup, parameters, true, cancel, observer)
-    }
-
-    /// As [`new`](Self::new), for a query: what its views do not need is not solved for.
-    ///
-    /// # Errors
-    /// As [`new`](Self::new).
-    pub fn query(
-        soup: TriangleSoup,
-        parameters: &Parameters,
-        cancel: &Cancel,
-        observer: &dyn Fn(Stage),
-    ) -> Result<Self, PipelineError> {
-        Self::solve(soup, parameters, false, cancel, observer)
-    }
-
-    fn solve(
-        soup: TriangleSoup,
-        parameters: &Parameters,
-        training: bool,
-        cancel: &Cancel,
+        role: Role,
+        within: Within<'_>,
         observer: &dyn Fn(Stage),
     ) -> Result<Self, PipelineError> {
         observer(Stage::Prepare);
-        let (mesh, mut report) = prepare_until(soup, &parameters.prepare_options(), cancel)?;
-        let part = taken_as_part(&report, parameters);
-        let mesh = if part {
+        let (mesh, mut report) =
+            prepare_within(soup, &parameters.prepare_options(), within.cancel, within.memory)?;
+        let mesh = if taken_as_part(&report, parameters) {
             smooth_boundary(mesh)?
         } else {
             let coarse = mesh.vertices().len();
-            let mesh = refine_until(mesh, refined_to(&report, parameters), cancel)?;
+            let mesh = refine_until(mesh, refined_to(&report, parameters), within.cancel)?;
             report.refined_to = Some(mesh.vertices().len()).filter(|fine| *fine > coarse);
             mesh
         };
-        cancel.check()?;
+        within.cancel.check()?;
+        Ok(Self { mesh, report, role })
+    }
+
+    /// Bytes at the peak of what follows, with what the factorisation takes on a mesh that is no surface.
+    ///
+    /// # Errors
+    /// [`PipelineError::Mesh`] where there is no memory to look at the edges, [`PipelineError::Cancelled`].
+    pub fn bytes(&self, parameters: &Parameters, within: Within<'_>) -> Result<u64, PipelineError> {
+        let excess = separator_excess(&self.mesh, within.cancel, within.memory)?;
+        let vertices = self.mesh.vertices().len();
+        Ok(
+            estimate::prepared_describing_bytes(vertices, parameters, self.role)
+                + estimate::factor_excess_bytes(vertices, excess, parameters),
+        )
+    }
+
+    /// Solves for the spectra; what the views of a query do not need is not solved for.
+    ///
+    /// # Errors
+    /// [`PipelineError::Spectral`], [`PipelineError::Cancelled`].
+    pub fn solve(
+        self,
+        parameters: &Parameters,
+        cancel: &Cancel,
+        observer: &dyn Fn(Stage),
+    ) -> Result<PreparedShape, PipelineError> {
+        let Self { mesh, report, role } = self;
+        let part = taken_as_part(&report, parameters);
+        let training = role == Role::Training;
         observer(Stage::Laplacian);
         let operators = assemble(&mesh)?;
         observer(Stage::Eigenpairs);
@@ -120,13 +126,46 @@ impl PreparedShape {
             (solve(&operators, n)?, None)
         };
         observer(Stage::Signatures);
-        Ok(Self {
+        Ok(PreparedShape {
             mesh,
             operators,
             eigenpairs,
             whitened,
             report,
         })
+    }
+}
+
+/// A mesh with the spectra its views are taken from.
+#[derive(Clone, Debug)]
+pub struct PreparedShape {
+    mesh: TriMesh,
+    operators: Operators,
+    pub(super) eigenpairs: Eigenpairs,
+    /// Of the whitened mesh, where it is wanted. Without it a query can still be compared.
+    pub(super) whitened: Option<Result<Eigenpairs, PipelineError>>,
+    pub(super) report: PrepareReport,
+}
+
+impl PreparedShape {
+    /// Cleans a mesh and solves for its spectrum; with the whitened hypothesis also for the whitened mesh's, at the
+    /// same time where the thread pool has room. For a training shape, which may be a query too.
+    ///
+    /// # Errors
+    /// The error of the stage that failed, or [`PipelineError::Cancelled`].
+    pub fn new(
+        soup: TriangleSoup,
+        parameters: &Parameters,
+        cancel: &Cancel,
+        observer: &dyn Fn(Stage),
+    ) -> Result<Self, PipelineError> {
+        let memory = MemoryBudget::unlimited().reservation();
+        let within = Within {
+            cancel,
+            memory: &memory,
+        };
+        CleanShape::new(soup, parameters, Role::Training, within, observer)?
+            .solve(parameters, cancel, observer)
     }
 
     /// What preparing did.

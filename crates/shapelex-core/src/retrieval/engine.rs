@@ -3,10 +3,13 @@
 use super::judge::judged_by;
 use super::{AtDeadline, Deadline, QueryError, QueryOutcome, RankingMethod, SearchIndex};
 use crate::baseline::Baseline;
+use crate::memory::{MemoryBudget, Reservation};
 use crate::mesh::TriangleSoup;
 use crate::parameters::RankBy;
 use crate::pipeline::estimate::{self, Role};
-use crate::pipeline::{Stage, describe_plain, describe_query};
+use crate::pipeline::{
+    Description, PipelineError, Stage, Within, describe_plain_within, describe_query_within,
+};
 use crate::ranking::{JUDGED, NotJudged, rank, rank_top, rank_until};
 use std::collections::BTreeSet;
 
@@ -24,12 +27,26 @@ pub struct QuerySpec {
 pub struct QueryEngine<'a> {
     /// Called at the beginning of every stage.
     pub observer: &'a dyn Fn(Stage),
+    /// The memory that is granted to the query, reserved before it is taken and given back at the end; it is not limited
+    /// where this is `None`.
+    pub memory: Option<&'a Reservation>,
+}
+
+/// What ranking is asked for, and what it may take.
+#[derive(Clone, Copy, Debug)]
+struct Terms<'a> {
+    top: Option<usize>,
+    within: Within<'a>,
+    then: AtDeadline,
 }
 
 impl Default for QueryEngine<'_> {
-    /// Reports no stage.
+    /// Reports no stage, and takes any memory.
     fn default() -> Self {
-        Self { observer: &|_| () }
+        Self {
+            observer: &|_| (),
+            memory: None,
+        }
     }
 }
 
@@ -50,9 +67,21 @@ impl QueryEngine<'_> {
         if index.dictionaries.classes.is_empty() {
             return Err(QueryError::EmptyIndex);
         }
+        let unlimited = MemoryBudget::unlimited().reservation();
+        let within = Within {
+            cancel: &deadline.passed,
+            memory: self.memory.unwrap_or(&unlimited),
+        };
         let answered = match spec.method {
-            RankingMethod::SparseCoding(rank_by) => self.code(index, mesh, rank_by, spec.top, deadline),
-            RankingMethod::Baseline(baseline) => self.compare(index, mesh, baseline, deadline),
+            RankingMethod::SparseCoding(rank_by) => {
+                let terms = Terms {
+                    top: spec.top,
+                    within,
+                    then: deadline.then,
+                };
+                self.code(index, mesh, rank_by, &terms)
+            }
+            RankingMethod::Baseline(baseline) => self.compare(index, mesh, baseline, within),
         };
         answered.map_err(|error| match deadline.then {
             AtDeadline::BestSoFar if error.is_cancelled() => QueryError::NothingScored,
@@ -66,15 +95,17 @@ impl QueryEngine<'_> {
         index: &SearchIndex,
         mesh: TriangleSoup,
         rank_by: RankBy,
-        top: Option<usize>,
-        deadline: &Deadline,
+        terms: &Terms<'_>,
     ) -> Result<QueryOutcome, QueryError> {
-        let (dictionaries, passed) = (&index.dictionaries, &deadline.passed);
+        let Terms { top, within, then } = *terms;
+        let (dictionaries, passed) = (&index.dictionaries, within.cancel);
         let parameters = &dictionaries.parameters;
-        let description = describe_query(mesh, parameters, passed, self.observer)?;
+        let description = describe_query_within(mesh, parameters, within, self.observer)?;
+        let bytes = ranking_bytes(&description, index);
+        let _ranking = within.memory.hold(bytes).map_err(PipelineError::from)?;
         (self.observer)(Stage::Ranking);
         let views = &description.views;
-        let ranking = match (deadline.then, top) {
+        let ranking = match (then, top) {
             (AtDeadline::BestSoFar, _) => rank_until(views, dictionaries, rank_by, passed),
             (AtDeadline::Fail, Some(top)) => rank_top(views, dictionaries, rank_by, top.max(JUDGED), passed),
             (AtDeadline::Fail, None) => rank(views, dictionaries, rank_by, passed),
@@ -94,11 +125,11 @@ impl QueryEngine<'_> {
         index: &SearchIndex,
         mesh: TriangleSoup,
         baseline: Baseline,
-        deadline: &Deadline,
+        within: Within<'_>,
     ) -> Result<QueryOutcome, QueryError> {
         let baselines = index.baselines.as_ref().ok_or(QueryError::NoBaselines)?;
         let parameters = &index.dictionaries.parameters;
-        let description = describe_plain(mesh, parameters, &deadline.passed, self.observer)?;
+        let description = describe_plain_within(mesh, parameters, within, self.observer)?;
         (self.observer)(Stage::Ranking);
         let nearest = baselines
             .nearest(&description, baseline)
@@ -110,21 +141,18 @@ impl QueryEngine<'_> {
             index.name(label).to_owned()
         }))
     }
+}
 
-    /// Memory that a query takes beside its mesh, in bytes, on a pool of `threads`: what a caller with a memory budget
-    /// reserves before it calls [`run`](Self::run).
-    pub fn bytes(index: &SearchIndex, mesh: &TriangleSoup, threads: usize) -> u64 {
-        let (vertices, parameters) = (mesh.vertices.len(), &index.dictionaries.parameters);
-        let largest = (index.dictionaries.classes.iter())
-            .flat_map(|class| class.dictionaries.values())
-            .map(|dictionary| dictionary.len())
-            .max();
-        let preparing = estimate::preparing_bytes(vertices, mesh.faces.len());
-        let describing = estimate::describing_bytes(vertices, parameters, Role::Query);
-        let ranking = estimate::ranking_bytes(vertices, largest.unwrap_or(0), threads, parameters);
-        let prepared = estimate::prepared_vertices(vertices, parameters);
-        let views = estimate::description_bytes(prepared, parameters, Role::Query);
-        // The views are held while they are ranked; the spectra are gone then.
-        preparing.max(describing).max(ranking + views)
-    }
+/// Memory that ranking a description takes with its views, in bytes. The spectra are gone then.
+fn ranking_bytes(description: &Description, index: &SearchIndex) -> u64 {
+    let parameters = &index.dictionaries.parameters;
+    let largest = (index.dictionaries.classes.iter())
+        .flat_map(|class| class.dictionaries.values())
+        .map(|dictionary| dictionary.len())
+        .max();
+    let prepared = description.report.vertices + description.report.holes_filled;
+    let vertices = description.report.refined_to.unwrap_or(prepared);
+    let threads = rayon::current_num_threads();
+    estimate::ranking_bytes(vertices, largest.unwrap_or(0), threads, parameters)
+        + estimate::description_bytes(vertices, parameters, Role::Query)
 }

@@ -21,6 +21,10 @@ use faer::{Par, Side};
 /// Rows per panel of the packed factor below a supernode's diagonal block.
 const PANEL: usize = 4;
 
+/// Below any ratio of operations to entries. `FORCE_SUPERNODAL` is 0, which a star does not exceed: the ordering leaves its
+/// hub out of the count, and the other vertices have no neighbours besides.
+const ALWAYS_SUPERNODAL: SupernodalThreshold = SupernodalThreshold(-1.0);
+
 /// The fill-reducing order and symbolic factor of S's pattern, with S's lower triangle ready to be shifted.
 pub struct Analysis {
     n: usize,
@@ -77,7 +81,7 @@ impl Analysis {
             Side::Lower,
             SymmetricOrdering::Amd,
             CholeskySymbolicParams {
-                supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+                supernodal_flop_ratio_threshold: ALWAYS_SUPERNODAL,
                 ..Default::default()
             },
         )

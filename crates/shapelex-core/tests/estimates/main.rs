@@ -1,10 +1,14 @@
 //! What admission reserves, against what is allocated: never too little, and not so much that nobody gets in.
 
 use shapelex_core::cancel::Cancel;
-use shapelex_core::mesh::TriangleSoup;
+use shapelex_core::memory::MemoryBudget;
+use shapelex_core::mesh::{MeshError, TriangleSoup};
 use shapelex_core::parameters::{Parameters, Preset};
 use shapelex_core::pipeline::estimate::{self, Role};
-use shapelex_core::pipeline::{Description, describe_query, describe_shape, held_out_scores, learn_model};
+use shapelex_core::pipeline::{
+    Description, PipelineError, Within, describe_query, describe_query_within, describe_shape,
+    held_out_scores, learn_model,
+};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::f64::consts::{PI, TAU};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -231,4 +235,51 @@ fn what_is_reserved_is_enough_and_not_absurd() {
         compare(&format!("learning, {name}"), peak, estimate, &mut wrong);
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    tangles_are_counted();
+}
+
+/// Random faces between random points.
+fn tangle(vertices: u32, faces: usize) -> TriangleSoup {
+    let mut state = 88_172_645_463_325_252u64;
+    let mut next = move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 32) as u32
+    };
+    TriangleSoup {
+        vertices: (0..vertices)
+            .map(|_| std::array::from_fn(|_| f64::from(next())))
+            .collect(),
+        faces: (0..faces)
+            .map(|_| std::array::from_fn(|_| next() % vertices))
+            .collect(),
+        ..TriangleSoup::default()
+    }
+}
+
+/// What a factor takes on a tangle is reserved before it is made.
+fn tangles_are_counted() {
+    let parameters = Parameters {
+        working_size: 0,
+        ..Parameters::preset(Preset::Default)
+    };
+    let cancel = Cancel::new();
+    // The factor of 8000 vertices that are all but all joined is dense: 256 MB, and as much while it is packed.
+    let budget = MemoryBudget::new(400 << 20);
+    let memory = budget.reservation();
+    let within = Within {
+        cancel: &cancel,
+        memory: &memory,
+    };
+    let refused = describe_query_within(tangle(8000, 400_000), &parameters, within, &|_| ());
+    assert!(
+        matches!(refused, Err(PipelineError::Mesh(MeshError::Memory(_)))),
+        "{refused:?}"
+    );
+    assert_eq!(budget.used(), 0);
+    // A surface of as many vertices fits.
+    let surface = describe_query_within(sphere(80, 100, false), &parameters, within, &|_| ());
+    assert_eq!(surface.unwrap().report.vertices, 8002);
+    assert_eq!(budget.used(), 0);
 }

@@ -2,6 +2,7 @@
 
 use crate::encode::*;
 use serde_json::{Value, json};
+use shapelex_core::memory::MemoryBudget;
 use shapelex_core::mesh::gltf::external_buffers;
 use shapelex_core::mesh::{Companion, Format, Limits, MeshError, ReadContext, Source, TriangleSoup};
 
@@ -9,7 +10,8 @@ use shapelex_core::mesh::{Companion, Format, Limits, MeshError, ReadContext, Sou
 fn read_case(name: &str) -> Result<TriangleSoup, MeshError> {
     let folder = shapelex_testing::data("mesh/cases/gltf");
     let bytes = std::fs::read(folder.join(name)).expect("a case");
-    let companions: Vec<Companion> = external_buffers(&bytes)
+    let companions: Vec<Companion> = external_buffers(&bytes, &MemoryBudget::unlimited().reservation())
+        .expect("memory is not limited")
         .iter()
         .filter_map(|uri| {
             let contents = uri

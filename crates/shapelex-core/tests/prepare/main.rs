@@ -2,6 +2,7 @@
 
 mod cleaning;
 mod hostile;
+mod hubs;
 mod hypotheses;
 mod large;
 mod noise;

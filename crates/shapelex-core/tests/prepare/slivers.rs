@@ -115,7 +115,6 @@ fn plate() -> TriangleSoup {
 }
 
 #[test]
-#[ignore = "known limit: where vertices are put on the edges of caps again and again, a few caps stay and slit the surface"]
 fn a_plate_with_a_hundred_vertices_on_its_edges() {
     let (clean, _) = prepare_full(plate());
     let expected = spectrum(&clean, 6);
@@ -275,13 +274,13 @@ fn many_caps_take_linear_time() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 600, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn closed_surfaces_stay_closed(
         torus in any::<bool>(),
         seed in any::<u64>(),
-        // From some 18 vertices on for 12 faces, put on caps as well, a cap may stay.
-        count in 1usize..12,
+        // On faces and on caps alike, many times over.
+        count in 1usize..100,
         exponent in -16i32..-5,
     ) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -328,3 +328,23 @@ fn what_the_dense_solver_gets_wrong_the_sparse_one_finds() {
         }
     }
 }
+
+#[test]
+fn a_star_is_factorised() {
+    // Pages of one edge, too many for the dense solver: but for the two hubs no vertex has a neighbour.
+    let n = 3500;
+    let mut vertices = vec![[0.0; 3], [0.0, 0.0, 1.0]];
+    let mut faces = Vec::new();
+    for i in 0..n {
+        let (r, turn) = (1.0 + 2.0 * f64::from(i) / f64::from(n), 2.4 * f64::from(i));
+        vertices.push([r * turn.cos(), r * turn.sin(), 0.5]);
+        faces.push([0, 1, i as u32 + 2]);
+    }
+    let operators = assemble(&mesh((vertices, faces))).unwrap();
+    // Its eigenvalues lie so close together that the recurrence may not tell them apart.
+    match smallest_eigenpairs(&operators, 40, &EigenOptions::default(), &Cancel::new()) {
+        Ok(pairs) => assert_sound(&operators, &pairs),
+        Err(SpectralError::NotConverged { detail }) => assert!(!detail.contains("supernodal"), "{detail}"),
+        Err(error) => panic!("{error}"),
+    }
+}

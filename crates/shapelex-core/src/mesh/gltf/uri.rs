@@ -5,7 +5,8 @@
 
 use super::container::{BYTE_ORDER_MARK, Container};
 use super::schema::{Buffer, Top, text};
-use crate::mesh::Format;
+use crate::memory::Reservation;
+use crate::mesh::{Format, MeshError};
 use serde_json::value::RawValue;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -72,23 +73,35 @@ impl BufferUri {
     }
 }
 
-/// The files a glTF document refers to, each once, in the order of their paths; none where the bytes are no glTF.
-pub fn external_buffers(bytes: &[u8]) -> Vec<BufferUri> {
+/// The files a glTF document refers to, each once, in the order of their paths; none where the bytes are no glTF. Memory is
+/// reserved in `memory` while the document is read.
+///
+/// # Errors
+/// [`MeshError::Memory`].
+pub fn external_buffers(bytes: &[u8], memory: &Reservation) -> Result<Vec<BufferUri>, MeshError> {
     let document = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     let format = if bytes.starts_with(b"glTF") {
         Format::Glb
     } else if document.trim_ascii_start().starts_with(b"{") {
         Format::Gltf
     } else {
-        return Vec::new();
+        return Ok(Vec::new());
     };
+    let mut _copy = None;
+    let container = Container::open(bytes, format, |bytes| {
+        _copy = Some(memory.hold(bytes as u64)?);
+        Ok(())
+    });
     // Whether the document is fit to be read at all is for the reader to say.
-    let Ok(container) = Container::open(bytes, format, |_| Ok(())) else {
-        return Vec::new();
+    let container = match container {
+        Ok(container) => container,
+        Err(error @ MeshError::Memory(_)) => return Err(error),
+        Err(_) => return Ok(Vec::new()),
     };
-    if container.check_counts().is_err() {
-        return Vec::new();
-    }
+    let Ok(bytes) = container.check_counts() else {
+        return Ok(Vec::new());
+    };
+    let _lists = memory.hold(bytes)?;
     let top: Top<'_> = serde_json::from_str(&container.json).unwrap_or_default();
     let list = top.buffers.map(RawValue::get).unwrap_or("[]");
     let buffers: Vec<&RawValue> = serde_json::from_str(list).unwrap_or_default();
@@ -99,7 +112,7 @@ pub fn external_buffers(bytes: &[u8]) -> Vec<BufferUri> {
         .filter_map(|uri| BufferUri::parse(&uri))
         .map(|uri| (uri.path.clone(), uri))
         .collect();
-    found.into_values().collect()
+    Ok(found.into_values().collect())
 }
 
 /// What follows `data:`, in any case.
@@ -159,6 +172,7 @@ pub(super) fn percent_decode(text: &[u8]) -> Cow<'_, [u8]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::memory::MemoryBudget;
 
     fn candidates(uri: &str) -> Vec<String> {
         let uri = BufferUri::parse(uri).expect("a file");
@@ -224,10 +238,25 @@ mod tests {
     #[test]
     fn external_buffers_are_listed_once_each() {
         let json = r#"{"buffers":[{"uri":"x.bin"},{"uri":"./x.bin"},{"uri":"data:;base64,AA=="},{},7,{"uri":"y.bin"}]}"#;
-        let list = external_buffers(format!("\u{feff} {json}").as_bytes());
+        let memory = MemoryBudget::new(4096).reservation();
+        let list = external_buffers(format!("\u{feff} {json}").as_bytes(), &memory).unwrap();
         let paths: Vec<&str> = list.iter().map(BufferUri::path).collect();
         assert_eq!(paths, ["x.bin", "y.bin"]);
-        assert!(external_buffers(b"v 0 0 0").is_empty());
-        assert!(external_buffers(b"{").is_empty());
+        assert!(external_buffers(b"v 0 0 0", &memory).unwrap().is_empty());
+        assert!(external_buffers(b"{", &memory).unwrap().is_empty());
+        assert_eq!(memory.bytes(), 0);
+    }
+
+    #[test]
+    fn the_copy_of_a_text_that_is_no_utf_8_is_reserved() {
+        let mut bytes = br#"{"buffers":[{"uri":"x.bin","name":""#.to_vec();
+        bytes.resize(bytes.len() + 10_000, 0xff);
+        bytes.extend(br#""}]}"#);
+        let found = external_buffers(&bytes, &MemoryBudget::new(20_000).reservation()).unwrap();
+        assert_eq!(found.len(), 1);
+        let budget = MemoryBudget::new(5_000);
+        let refused = external_buffers(&bytes, &budget.reservation());
+        assert!(matches!(refused, Err(MeshError::Memory(_))), "{refused:?}");
+        assert_eq!(budget.used(), 0);
     }
 }
