@@ -47,6 +47,15 @@ pub const CASES: &[fn() -> Large] = &[
             200,
         )
     },
+    || {
+        let line = b"v 0 0 0\\\n".repeat(1_000_000);
+        (
+            "an OBJ of one line continued a million times",
+            "model/obj",
+            line,
+            422,
+        )
+    },
 ];
 
 /// Xorshift (Marsaglia 2003).

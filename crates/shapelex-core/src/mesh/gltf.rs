@@ -35,7 +35,7 @@ mod used;
 mod view;
 mod work;
 
-pub use uri::{BufferUri, external_buffers};
+pub use uri::{BufferFiles, BufferUri, external_buffers};
 
 use super::{Format, MeshError, Pose, ReadContext, Source, TriangleSoup};
 use animation::{Clip, Tracks};

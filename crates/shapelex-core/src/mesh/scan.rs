@@ -144,6 +144,8 @@ impl<'a> Scanner<'a> {
     #[inline]
     pub fn next_line(&mut self) {
         let start = self.at;
+        // A comment that began on this line, and from where it is looked for: never twice over the same bytes.
+        let (mut comment, mut searched) = (false, start);
         loop {
             self.look_at_cancel();
             let block = &self.bytes[self.at..self.bytes.len().min(self.at + BLOCK)];
@@ -156,11 +158,14 @@ impl<'a> Scanner<'a> {
             };
             let end = self.at + k;
             self.at = end + 1;
-            let continued = self.backslash == Backslash::Continues
-                && end > start
-                && self.bytes[end - 1] == b'\\'
-                && memchr::memchr(b'#', &self.bytes[start..end]).is_none();
-            if !continued {
+            let backslash =
+                self.backslash == Backslash::Continues && end > start && self.bytes[end - 1] == b'\\';
+            if !backslash {
+                return;
+            }
+            comment |= memchr::memchr(b'#', &self.bytes[searched..end]).is_some();
+            searched = end;
+            if comment {
                 return;
             }
             // The line feed of a CRLF belongs to the line end that was continued.

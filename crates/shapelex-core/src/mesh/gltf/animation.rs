@@ -2,6 +2,7 @@
 
 use super::accessor::Column;
 use super::document::Document;
+use super::list::shortened;
 use super::matrix::slerp;
 use super::nodes::NodeState;
 use super::schema::{self, Channel, Index, Sampler};
@@ -63,7 +64,7 @@ impl Clip {
                 name: animation
                     .name
                     .and_then(schema::text)
-                    .map_or_else(|| format!("clip{k}"), |name| name.into_owned()),
+                    .map_or_else(|| format!("clip{k}"), |name| shortened(&name)),
                 movers,
                 samplers: samplers.map(|raw| serde_json::from_str(raw.get()).ok()).collect(),
             });

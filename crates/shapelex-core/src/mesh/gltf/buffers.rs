@@ -2,8 +2,9 @@
 //! with it.
 
 use super::list::List;
+use super::uri::{BufferFiles, BufferUri};
 use crate::memory::Held;
-use crate::mesh::{MeshError, ReadContext, Source};
+use crate::mesh::{Companion, MeshError, ReadContext, Source};
 use std::cell::{Cell, OnceCell, RefCell};
 use std::collections::BTreeSet;
 
@@ -18,6 +19,8 @@ pub(super) struct Buffers<'d> {
     pub list: List<'d>,
     pub binary: Option<&'d [u8]>,
     pub source: Source<'d>,
+    /// The names of the files that came along.
+    files: OnceCell<BufferFiles>,
     context: &'d ReadContext,
     pub loaded: Vec<OnceCell<Loaded<'d>>>,
     /// Views that were decompressed.
@@ -58,12 +61,21 @@ impl<'d> Buffers<'d> {
             list,
             binary,
             source: *source,
+            files: OnceCell::new(),
             context,
             views: (0..views).map(|_| OnceCell::new()).collect(),
             counted: RefCell::default(),
             taken: Cell::new(source.bytes.len()),
             unpacked: Cell::new(0),
         }
+    }
+
+    /// The file that came along under this name.
+    pub fn file(&self, uri: &BufferUri) -> Option<&'d [u8]> {
+        let companions = self.source.companions;
+        let names = || companions.iter().map(|companion| (companion.name.as_str(), true));
+        let files = self.files.get_or_init(|| BufferFiles::new(names()));
+        companions.get(files.find("", uri)?).map(Companion::bytes)
     }
 
     /// Counts a file that came along, once however many URIs mean it.

@@ -2,8 +2,8 @@
 
 use super::buffers::Buffers;
 use super::container::Container;
-use super::list::{List, reason};
-use super::schema::{Asset, Index, Top, text};
+use super::list::{List, reason, shortened};
+use super::schema::{Asset, Index, OnlyUri, Top, text};
 use super::work::Work;
 use crate::memory::Held;
 use crate::mesh::{Format, Limits, MeshError, ReadContext, Source};
@@ -111,11 +111,19 @@ impl<'d> Document<'d> {
         if let Some(extension) = required.into_iter().filter_map(text).find(|e| !accepted(e)) {
             return Err(MeshError::Unsupported {
                 format,
-                feature: extension.into_owned(),
+                feature: shortened(&extension),
             });
         }
-        let scene = top.scene.map(|raw| serde_json::from_str::<Index>(raw.get()));
-        let scene = scene.transpose().map_err(|e| malformed(format!("scene: {e}")))?;
+        let scene = match top.scene {
+            Some(raw) => {
+                let _message = message(raw, context)?;
+                Some(serde_json::from_str::<Index>(raw.get()))
+            }
+            None => None,
+        };
+        let scene = scene
+            .transpose()
+            .map_err(|e| malformed(format!("scene: {}", reason(&e))))?;
         let buffers = list("buffer", top.buffers)?;
         let views = list("buffer view", top.buffer_views)?;
         Ok(Self {
@@ -158,6 +166,7 @@ impl<'d> Document<'d> {
         let raw = self.element(list, index)?;
         // An element that is referred to very often is parsed as often.
         self.work.spend(raw.get().len(), 2, "steps of reading its JSON")?;
+        let _message = message(raw, self.context)?;
         serde_json::from_str(raw.get())
             .map_err(|error| self.malformed(format!("{} {index}: {}", list.name(), reason(&error))))
     }
@@ -172,6 +181,23 @@ impl<'d> Document<'d> {
             ))
         })
     }
+}
+
+/// Elements up to this many bytes are read without a reservation for the message of an error.
+const SHORT_ELEMENT: usize = 64 << 10;
+/// Bytes of such a message per byte of the element: it repeats a string that stands in the wrong place, a control
+/// character takes six bytes there, and there are two copies for a moment.
+const MESSAGE_BYTES: usize = 12;
+
+/// Memory for the message of an error in an element. A buffer's `uri` is a long string by right, and never in a message.
+fn message<'c>(raw: &RawValue, context: &'c ReadContext) -> Result<Option<Held<'c>>, MeshError> {
+    if raw.get().len() <= SHORT_ELEMENT {
+        return Ok(None);
+    }
+    let uri = serde_json::from_str::<OnlyUri<'_>>(raw.get()).ok();
+    let uri = uri.and_then(|only| only.uri).map_or(0, |uri| uri.get().len());
+    let length = raw.get().len() - uri;
+    Ok(Some(context.memory.hold((length * MESSAGE_BYTES) as u64)?))
 }
 
 /// The top level of a document of glTF 2.

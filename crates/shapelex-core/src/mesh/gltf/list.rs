@@ -12,6 +12,10 @@ impl<'t> List<'t> {
     /// A list whose elements are called `name` in messages; empty where there is none. The error says what is wrong.
     pub fn parse(name: &'static str, raw: Option<&'t RawValue>) -> Result<Self, String> {
         let elements = match raw {
+            // The error of another value would repeat it, however long it is.
+            Some(raw) if !raw.get().starts_with('[') => {
+                return Err(format!("its list of {name}s is no list"));
+            }
             Some(raw) => {
                 serde_json::from_str(raw.get()).map_err(|e| format!("its list of {name}s: {}", reason(&e)))?
             }
@@ -42,5 +46,16 @@ impl<'t> List<'t> {
 pub(super) fn reason(error: &serde_json::Error) -> String {
     let text = error.to_string();
     let end = text.rfind(" at line ").unwrap_or(text.len());
-    text[..end].to_owned()
+    shortened(&text[..end])
+}
+
+/// Longest text of a file that a message or a label repeats, in characters.
+const MAX_SHOWN: usize = 200;
+
+/// The beginning of a text of the file.
+pub(super) fn shortened(text: &str) -> String {
+    match text.char_indices().nth(MAX_SHOWN) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
 }

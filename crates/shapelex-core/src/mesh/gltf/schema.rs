@@ -306,6 +306,13 @@ pub(super) struct Buffer<'t> {
     pub byte_length: Option<Whole>,
 }
 
+/// The one text of an element that may be long.
+#[derive(Deserialize)]
+pub(super) struct OnlyUri<'t> {
+    #[serde(default, borrow)]
+    pub uri: Option<&'t RawValue>,
+}
+
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Skin {

@@ -9,7 +9,7 @@ use crate::memory::Reservation;
 use crate::mesh::{Format, MeshError};
 use serde_json::value::RawValue;
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// A buffer that lies in a file of its own.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -48,28 +48,42 @@ impl BufferUri {
             .chain(std::iter::once(last(&self.path)))
             .filter(inside)
     }
+}
 
-    /// Finds the file among others: first by the path from `folder`, in which the document lies, then by its last part
-    /// among those for which `by_name` holds.
-    pub fn find<'f, T>(
-        &self,
-        folder: &str,
-        files: &'f [T],
-        name: impl Fn(&T) -> &str,
-        by_name: impl Fn(&T) -> bool,
-    ) -> Option<&'f T> {
+/// The names of files that came along, so that many buffers are found among many files in time.
+#[derive(Clone, Debug, Default)]
+pub struct BufferFiles {
+    /// By the name as it is and by its path in plain spelling; the first file of a name counts.
+    places: HashMap<String, usize>,
+    /// By the last part alone.
+    last_parts: HashMap<String, usize>,
+}
+
+impl BufferFiles {
+    /// The files of these names, in their order, and whether a file is found by the last part of its name alone.
+    pub fn new<'n>(names: impl IntoIterator<Item = (&'n str, bool)>) -> Self {
+        let mut files = Self::default();
+        for (i, (name, by_last_part)) in names.into_iter().enumerate() {
+            let place = plain(name);
+            if by_last_part {
+                files.last_parts.entry(last(&place).to_owned()).or_insert(i);
+            }
+            files.places.entry(place).or_insert(i);
+            files.places.entry(name.to_owned()).or_insert(i);
+        }
+        files
+    }
+
+    /// Which file a buffer is: first by the path from `folder`, in which the document lies, then by its last part.
+    pub fn find(&self, folder: &str, uri: &BufferUri) -> Option<usize> {
         let at = |path: &str| {
-            let wanted = plain(&format!("{folder}/{path}"));
-            files
-                .iter()
-                .find(|file| plain(name(file)) == wanted || name(file) == path)
+            let beside = self.places.get(&plain(&format!("{folder}/{path}")));
+            beside.into_iter().chain(self.places.get(path)).min()
         };
-        let named = || {
-            let wanted = last(&self.path);
-            let same = |file: &&T| by_name(file) && last(&plain(name(file))) == wanted;
-            files.iter().find(same)
-        };
-        at(&self.path).or_else(|| at(&self.literal)).or_else(named)
+        at(&uri.path)
+            .or_else(|| at(&uri.literal))
+            .or_else(|| self.last_parts.get(last(&uri.path)))
+            .copied()
     }
 }
 
@@ -225,9 +239,10 @@ mod tests {
     #[test]
     fn a_file_is_found_from_its_folder_first() {
         let files = ["one/b.bin", "two/b.bin", "shared/c.bin", "b.bin"];
+        let index = BufferFiles::new(files.iter().map(|f| (*f, !f.contains('/'))));
         let find = |uri: &str, folder: &str| {
             let uri = BufferUri::parse(uri).expect("a file");
-            uri.find(folder, &files, |f| f, |f| !f.contains('/')).copied()
+            index.find(folder, &uri).map(|i| files[i])
         };
         assert_eq!(find("b.bin", "two"), Some("two/b.bin"));
         assert_eq!(find("./b.bin", "three"), Some("b.bin"));

@@ -135,13 +135,11 @@ impl<'d> Document<'d> {
         if let Some(data) = uri::data(&uri) {
             return Ok(Loaded::Unpacked(Box::new(self.decode_data_uri(index, data)?)));
         }
-        let companions = self.buffers.source.companions;
-        let found = BufferUri::parse(&uri)
-            .and_then(|file| file.find("", companions, |c| c.name.as_str(), |_| true))
+        let bytes = BufferUri::parse(&uri)
+            .and_then(|file| self.buffers.file(&file))
             .ok_or_else(|| MeshError::MissingBuffer {
                 uri: uri.chars().take(200).collect(),
             })?;
-        let bytes = found.bytes();
         self.buffers.count_file(bytes)?;
         Ok(Loaded::There(bytes))
     }
