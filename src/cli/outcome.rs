@@ -30,7 +30,9 @@ pub(super) fn unreachable(base: &str, error: &ureq::Error) -> CallError {
         ureq::Error::Io(io) => format!("{base}: {io}"),
         other => format!("{base}: {other}"),
     };
-    let hint = if text.contains("invalid peer certificate") {
+    let hint = if text.contains("CaUsedAsEndEntity") {
+        "; that is the certificate of an authority, make one for the service with basicConstraints=CA:FALSE"
+    } else if text.contains("invalid peer certificate") {
         "; --ca-cert FILE says which certificate to trust"
     } else if text.contains("invalid HTTP version") && base.starts_with("http:") {
         "; the service may speak TLS, try https:// instead of http://"

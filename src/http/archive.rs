@@ -72,10 +72,11 @@ pub fn unpack(kind: ArchiveKind, bytes: &[u8], limits: &ArchiveLimits) -> Result
         cancel: &Cancel::new(),
         memory: &MemoryBudget::unlimited().reservation(),
     };
-    unpack_within(kind, bytes, limits, &unpacking)
+    unpack_within(kind, bytes, &mut limits.clone(), &unpacking)
 }
 
-/// As [`unpack`], within the memory of a request and until it is stopped.
+/// As [`unpack`], within the memory of a request and until it is stopped. Takes off the limits what the archive had, files
+/// that are passed over included: they cost their unpacking too.
 ///
 /// # Errors
 /// Those of [`unpack`]; `archive_too_large` where the files never fit the memory, `overloaded` where they do not at the
@@ -83,25 +84,28 @@ pub fn unpack(kind: ArchiveKind, bytes: &[u8], limits: &ArchiveLimits) -> Result
 pub fn unpack_within(
     kind: ArchiveKind,
     bytes: &[u8],
-    limits: &ArchiveLimits,
+    limits: &mut ArchiveLimits,
     unpacking: &Unpacking<'_>,
 ) -> Result<Vec<Member>, Problem> {
-    let collected = Collector::new(limits, unpacking);
+    let mut collected = Collector::new(limits, unpacking);
     match kind {
-        ArchiveKind::Zip => unpack_zip(bytes, collected),
-        ArchiveKind::Tar => unpack_tar(Cursor::new(bytes), collected),
+        ArchiveKind::Zip => unpack_zip(bytes, &mut collected)?,
+        ArchiveKind::Tar => unpack_tar(Cursor::new(bytes), &mut collected)?,
         ArchiveKind::TarGz => {
             // Headers, padding and folders come out of the gzip too, so its own ceiling lies above that of the files.
             let ceiling = limits
                 .max_bytes
                 .saturating_add(limits.max_members.saturating_mul(2048));
             let inflated = flate2::read::MultiGzDecoder::new(bytes).take(ceiling as u64 + 1);
-            unpack_tar(inflated, collected)
+            unpack_tar(inflated, &mut collected)?;
         }
     }
+    let (members, left) = (collected.members, collected.left);
+    *limits = left;
+    Ok(members)
 }
 
-fn unpack_zip(bytes: &[u8], mut collected: Collector<'_>) -> Result<Vec<Member>, Problem> {
+fn unpack_zip(bytes: &[u8], collected: &mut Collector<'_>) -> Result<(), Problem> {
     let broken = |error: zip::result::ZipError| broken("zip", error);
     // The iterable reader parses one entry at a time: a directory of a million entries costs nothing before its
     // count is seen.
@@ -122,7 +126,7 @@ fn unpack_zip(bytes: &[u8], mut collected: Collector<'_>) -> Result<Vec<Member>,
             collected.count()?;
         }
     }
-    Ok(collected.members)
+    Ok(())
 }
 
 /// Bytes one member of a tar may have before its contents: its header, and names and attributes too long for that.
@@ -153,7 +157,7 @@ impl<R: Read> Read for Rationed<'_, R> {
     }
 }
 
-fn unpack_tar(reader: impl Read, mut collected: Collector<'_>) -> Result<Vec<Member>, Problem> {
+fn unpack_tar(reader: impl Read, collected: &mut Collector<'_>) -> Result<(), Problem> {
     let left = Cell::new(MAX_TAR_HEADERS);
     let cancel = collected.unpacking.cancel;
     let broken = |error: std::io::Error| match cancel.check() {
@@ -177,13 +181,14 @@ fn unpack_tar(reader: impl Read, mut collected: Collector<'_>) -> Result<Vec<Mem
             collected.count()?;
         }
         // What was not taken is passed over here, since the next entry would do so at the expense of its own headers.
-        std::io::copy(&mut entry, &mut std::io::sink()).map_err(broken)?;
+        let passed = std::io::copy(&mut entry, &mut std::io::sink()).map_err(broken)?;
+        collected.pass(passed)?;
         left.set(MAX_TAR_HEADERS);
     }
     left.set(u64::MAX);
     // The entries end before the stream does; what follows may be where a compressed one turns out to be cut short.
-    std::io::copy(&mut archive.into_inner(), &mut std::io::sink()).map_err(broken)?;
-    Ok(collected.members)
+    let passed = std::io::copy(&mut archive.into_inner(), &mut std::io::sink()).map_err(broken)?;
+    collected.pass(passed)
 }
 
 fn broken(kind: &str, error: impl std::fmt::Display) -> Problem {
@@ -209,23 +214,22 @@ fn no_room(error: MemoryError) -> Problem {
 }
 
 struct Collector<'a> {
-    limits: &'a ArchiveLimits,
+    limits: ArchiveLimits,
+    /// What is left of the limits.
+    left: ArchiveLimits,
     unpacking: &'a Unpacking<'a>,
     piece: Vec<u8>,
     members: Vec<Member>,
-    seen: usize,
-    bytes: usize,
 }
 
 impl<'a> Collector<'a> {
-    fn new(limits: &'a ArchiveLimits, unpacking: &'a Unpacking<'a>) -> Self {
+    fn new(limits: &ArchiveLimits, unpacking: &'a Unpacking<'a>) -> Self {
         Self {
-            limits,
+            limits: *limits,
+            left: *limits,
             unpacking,
             piece: vec![0; PIECE],
             members: Vec::new(),
-            seen: 0,
-            bytes: 0,
         }
     }
 
@@ -252,8 +256,19 @@ impl<'a> Collector<'a> {
     }
 
     fn count(&mut self) -> Result<(), Problem> {
-        self.seen += 1;
-        self.check_count(self.seen)
+        match self.left.max_members.checked_sub(1) {
+            Some(left) => self.left.max_members = left,
+            None => self.check_count(self.limits.max_members + 1)?,
+        }
+        Ok(())
+    }
+
+    /// Counts bytes that were unpacked and not taken.
+    fn pass(&mut self, bytes: u64) -> Result<(), Problem> {
+        let left = (self.left.max_bytes as u64).checked_sub(bytes);
+        let left = left.and_then(|left| usize::try_from(left).ok());
+        self.left.max_bytes = left.ok_or_else(|| self.too_large())?;
+        Ok(())
     }
 
     /// Adds a file. Its declared size can refuse it before anything is unpacked, but never let it in.
@@ -263,7 +278,7 @@ impl<'a> Collector<'a> {
         if is_clutter(&path) {
             return Ok(());
         }
-        let left = self.limits.max_bytes - self.bytes;
+        let left = self.left.max_bytes;
         if declared > left as u64 {
             return Err(self.too_large());
         }
@@ -294,7 +309,7 @@ impl<'a> Collector<'a> {
             )
             .with("member", path));
         }
-        self.bytes += bytes.len();
+        self.left.max_bytes -= bytes.len();
         self.members.push(Member { path, bytes });
         Ok(())
     }

@@ -1,17 +1,18 @@
 //! A batch of queries → lines of JSON, as meshes are finished.
 
 use super::admission::Patience;
-use super::dto::query::{BatchLine, BatchSummary, QueryAnswer, QueryOptions};
+use super::dto::query::{BatchLine, BatchSummary, QueryOptions};
 use super::metrics;
 use super::poses::Poses;
 use super::problem::Problem;
-use super::run_query::run_query;
+use super::run_query::{Rendered, run_query};
 use super::state::AppState;
 use super::uploaded::UploadedMesh;
 use crate::jobs::LiveIndex;
 use axum::body::Body;
 use bytes::Bytes;
 use futures_util::{Stream, StreamExt, stream};
+use shapelex_core::memory::Reservation;
 use std::convert::Infallible;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -27,6 +28,17 @@ pub(super) struct Batch {
     pub(super) id: Option<String>,
 }
 
+/// The memory of the lines that the client has not taken yet: the last one, and the one before, of which a part may be
+/// left.
+#[derive(Default)]
+struct Sending(Option<Reservation>, Option<Reservation>);
+
+impl Sending {
+    fn hold(&mut self, memory: Reservation) {
+        self.0 = self.1.replace(memory);
+    }
+}
+
 /// A mesh of a batch, or one pose of it, by the mesh's number.
 type Numbered<T> = (usize, UploadedMesh, T);
 
@@ -38,27 +50,30 @@ impl Batch {
         let answers = self.clone().answers(meshes, &expected);
         let id = self.id;
         let lines = stream::unfold(
-            (Box::pin(answers), BatchSummary::default(), false),
-            move |(mut answers, mut summary, ended)| {
+            (
+                Box::pin(answers),
+                BatchSummary::default(),
+                false,
+                Sending::default(),
+            ),
+            move |(mut answers, mut summary, ended, mut sending)| {
                 let (id, expected) = (id.clone(), Arc::clone(&expected));
                 async move {
                     if ended {
                         return None;
                     }
                     let line = match answers.next().await {
-                        Some(answer) => line(answer, &mut summary, id.as_deref()),
+                        Some(answer) => line(answer, &mut summary, &mut sending, id.as_deref()),
                         None if summary.ok + summary.failed < expected.load(Ordering::Relaxed) => {
                             return None;
                         }
                         None => {
                             summary.total = summary.ok + summary.failed;
-                            return Some((
-                                line_of(&BatchLine::Summary { summary }),
-                                (answers, summary, true),
-                            ));
+                            let last = line_of(&BatchLine::Summary { summary });
+                            return Some((Ok::<_, Infallible>(last), (answers, summary, true, sending)));
                         }
                     };
-                    Some((line_of(&line), (answers, summary, false)))
+                    Some((Ok(line), (answers, summary, false, sending)))
                 }
             },
         );
@@ -71,7 +86,7 @@ impl Batch {
         self,
         meshes: Vec<UploadedMesh>,
         expected: &Arc<AtomicUsize>,
-    ) -> impl Stream<Item = Numbered<Result<QueryAnswer, Problem>>> + use<> {
+    ) -> impl Stream<Item = Numbered<Result<Rendered, Problem>>> + use<> {
         let threads = self.state.config.query_threads.max(1);
         let stopping = self.state.stopping.clone();
         let (expected, ranking) = (Arc::clone(expected), self.clone());
@@ -93,7 +108,14 @@ impl Batch {
                             let Batch {
                                 state, live, options, ..
                             } = batch;
-                            run_query(&state, Patience::Batch, live, mesh.clone(), options).await
+                            let line = move |answer| {
+                                line_of(&BatchLine::Answered {
+                                    status: "ok",
+                                    index,
+                                    answer: Box::new(answer),
+                                })
+                            };
+                            run_query(&state, Patience::Batch, live, mesh.clone(), options, line).await
                         }
                         Err(problem) => Err(problem),
                     };
@@ -131,18 +153,16 @@ impl Batch {
 }
 
 fn line(
-    (index, mesh, answer): Numbered<Result<QueryAnswer, Problem>>,
+    (index, mesh, answer): Numbered<Result<Rendered, Problem>>,
     summary: &mut BatchSummary,
+    sending: &mut Sending,
     id: Option<&str>,
-) -> BatchLine {
+) -> Bytes {
     match answer {
-        Ok(answer) => {
+        Ok(rendered) => {
             summary.ok += 1;
-            BatchLine::Answered {
-                status: "ok",
-                index,
-                answer: Box::new(answer),
-            }
+            sending.hold(rendered.memory);
+            rendered.text
         }
         Err(problem) => {
             summary.failed += 1;
@@ -151,20 +171,20 @@ fn line(
                 let (code, name) = (problem.code.name(), &mesh.name);
                 tracing::error!(code, internal, name, "{}", problem.detail);
             }
-            BatchLine::Failed {
+            line_of(&BatchLine::Failed {
                 status: "failed",
                 index,
                 pose: mesh.pose().cloned().map(Into::into),
                 name: mesh.name,
                 problem: problem.to_json(id),
-            }
+            })
         }
     }
 }
 
-fn line_of(line: &BatchLine) -> Result<Bytes, Infallible> {
+fn line_of(line: &BatchLine) -> Bytes {
     // Strings, numbers and maps with string keys always serialise.
     let mut text = serde_json::to_vec(line).unwrap_or_default();
     text.push(b'\n');
-    Ok(text.into())
+    text.into()
 }

@@ -83,6 +83,13 @@ pub(super) fn rejected(mut failures: Vec<(String, Problem)>, total: usize) -> Pr
     .with("failures", list)
 }
 
+/// Bytes that a shape takes from its check to the answer, beside its names: the shape, its record and its part of the
+/// answer.
+const SHAPE_BYTES: u64 = 8 << 10;
+/// How often the names of a shape and of its buffers are there meanwhile: in the new shape, the record, the shape that was
+/// added, and the answer as values and as text.
+const SHAPE_COPIES: u64 = 8;
+
 fn check_one(
     mesh: &UploadedMesh,
     poses: Option<usize>,
@@ -91,9 +98,13 @@ fn check_one(
 ) -> Result<Vec<NewShape>, Problem> {
     // Shared by all poses.
     let companions = mesh.companions(context)?;
+    let names: usize = companions.iter().map(|companion| companion.name.len()).sum();
+    let names = names + mesh.name.len() + mesh.member.as_ref().map_or(0, String::len);
     let shape = |format, pose, soup: TriangleSoup| -> Result<NewShape, Problem> {
         let (_, mut report) = prepare_within(soup, options, &context.cancel, &context.memory)?;
         report.warnings.splice(0..0, context.warnings.list());
+        // Held from here until the answer tells of it.
+        mesh.hold(SHAPE_BYTES + SHAPE_COPIES * names as u64)?;
         Ok(NewShape {
             name: Some(mesh.name.clone()),
             bytes: mesh.bytes.clone(),

@@ -59,7 +59,7 @@ pub fn authority(request: &Request) -> Option<Authority> {
 fn require(parts: &Parts, authority: &str) -> Result<(), Problem> {
     let named = authority.parse::<Authority>().ok();
     // `user@host` is no name of a host.
-    let host = named.filter(|_| !authority.contains('@'));
+    let host = named.filter(|named| !authority.contains('@') && is_host_and_port(named));
     let Some(host) = host.map(|authority| canonical(authority.host())) else {
         return Err(misdirected("what is no name"));
     };
@@ -68,6 +68,18 @@ fn require(parts: &Parts, authority: &str) -> Result<(), Problem> {
     }
     let shown: String = host.chars().take(100).collect();
     Err(misdirected(&format!("'{shown}'")).with("host", shown))
+}
+
+/// Whether an authority is a host with or without a port. The parser also takes `[::1].example` and `localhost:x`.
+pub fn is_host_and_port(authority: &Authority) -> bool {
+    match authority.as_str().strip_prefix(authority.host()) {
+        Some("") => true,
+        Some(rest) => rest.strip_prefix(':').is_some_and(|port| {
+            port.is_empty() || (port.bytes().all(|b| b.is_ascii_digit()) && port.parse::<u16>().is_ok())
+        }),
+        // `user@host`.
+        None => false,
+    }
 }
 
 fn misdirected(host: &str) -> Problem {
@@ -124,6 +136,28 @@ mod tests {
             listen: listen.parse().unwrap(),
             hosts: hosts.iter().map(|&name| name.to_owned()).collect(),
             ..ServiceConfig::default()
+        }
+    }
+
+    #[test]
+    fn what_is_no_host_and_port_is_no_name() {
+        let is_one = |text: &str| {
+            text.parse::<Authority>()
+                .is_ok_and(|named| is_host_and_port(&named))
+        };
+        for text in ["localhost", "localhost:80", "localhost:", "[::1]", "[::1]:7345"] {
+            assert!(is_one(text), "{text}");
+        }
+        for text in [
+            "[::1].evil.test",
+            "[::1]evil",
+            "localhost:x",
+            "localhost:99999",
+            "localhost:+80",
+            "a@localhost",
+            "",
+        ] {
+            assert!(!is_one(text), "{text}");
         }
     }
 

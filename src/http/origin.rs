@@ -5,7 +5,7 @@
 //! and in `Sec-Fetch-Site`, which no page can set. Programs send neither.
 
 use super::config::ServiceConfig;
-use super::host::{authority, canonical, is_configured};
+use super::host::{authority, canonical, is_configured, is_host_and_port};
 use super::problem::{Code, Problem};
 use super::state::Parts;
 use axum::extract::Request;
@@ -53,8 +53,8 @@ fn is_from_elsewhere(headers: &HeaderMap) -> bool {
     said.any(|site| site != "same-origin" && site != "none")
 }
 
-/// Whether an origin is the service's own: the name and port the request calls it by, or a configured name where a proxy
-/// in front calls it by another.
+/// Whether an origin is the service's own: the name and port the request calls it by, or a configured name with the usual
+/// port where a proxy in front calls it by another.
 fn is_own(config: &ServiceConfig, request: &Request, origin: &str) -> bool {
     let Ok(origin) = origin.parse::<Uri>() else {
         return false;
@@ -72,8 +72,14 @@ fn is_own(config: &ServiceConfig, request: &Request, origin: &str) -> bool {
         (canonical(authority.host()), port)
     };
     let called = authority(request);
-    called.is_some_and(|called| place(&called) == place(from))
-        || is_configured(config, &canonical(from.host()))
+    is_host_and_port(from)
+        && (called.is_some_and(|called| place(&called) == place(from))
+            || is_usual(from) && is_configured(config, &canonical(from.host())))
+}
+
+/// Whether an origin has the port a proxy has. What listens on another port of a configured name is another site.
+fn is_usual(origin: &Authority) -> bool {
+    matches!(origin.port_u16(), None | Some(80 | 443))
 }
 
 fn refused(origin: &str) -> Problem {

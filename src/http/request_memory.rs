@@ -93,6 +93,20 @@ impl HttpBody for HeldBody {
     }
 }
 
+/// What an item of a list takes per byte of its record: as it is read, as it goes over the wire, and as text.
+const PAGE_FACTOR: u64 = 6;
+
+/// Reserves memory for the items of a page, as they are read.
+pub fn page_memory(memory: &Reservation) -> impl FnMut(usize) -> Result<(), Problem> {
+    |bytes| Ok(memory.grow(PAGE_FACTOR * bytes as u64)?)
+}
+
+/// Counts an event until the next one. Short ones are not counted, as short answers are not.
+pub fn counted_event(memory: &Reservation, bytes: u64) -> bool {
+    memory.shrink(u64::MAX);
+    bytes < COUNTED_FROM || memory.grow(bytes).is_ok()
+}
+
 /// Bytes that are read of a file at a time.
 const FILE_PIECE: usize = 64 << 10;
 /// Pieces that are held at a time: by the file, by the stream, and while the client takes them.

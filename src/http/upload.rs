@@ -9,7 +9,7 @@ use super::config::UploadLimits;
 use super::multipart::receive_multipart;
 use super::problem::{Code, Problem};
 use super::request_memory;
-use super::uploaded::{Buffers, Part, Posture, UploadedMesh};
+use super::uploaded::{Buffers, Part, Posture, SentBuffers, UploadedMesh};
 use crate::model::text::is_hidden;
 use axum::extract::Request;
 use axum::http::{HeaderMap, header};
@@ -174,9 +174,7 @@ fn sort(
             files.push(part);
             continue;
         };
-        for member in archive::unpack_within(kind, &part.bytes, &archive_limits, &unpacking)? {
-            archive_limits.max_members = archive_limits.max_members.saturating_sub(1);
-            archive_limits.max_bytes = archive_limits.max_bytes.saturating_sub(member.bytes.len());
+        for member in archive::unpack_within(kind, &part.bytes, &mut archive_limits, &unpacking)? {
             files.push(Part {
                 name: member.path,
                 path: None,
@@ -205,7 +203,7 @@ fn sort(
         )
         .with("ignored", ignored));
     }
-    let buffers = Arc::new(buffers);
+    let buffers = Arc::new(SentBuffers::new(buffers));
     let meshes = meshes
         .into_iter()
         .map(|file| UploadedMesh {

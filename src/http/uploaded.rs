@@ -5,8 +5,8 @@ use crate::model::ShapePose;
 use bytes::Bytes;
 use shapelex_core::cancel::Cancel;
 use shapelex_core::memory::Reservation;
-use shapelex_core::mesh::gltf::external_buffers;
-use shapelex_core::mesh::{Companion, Format, Limits, Pose, ReadContext, Source, TriangleSoup};
+use shapelex_core::mesh::gltf::{BufferFiles, external_buffers};
+use shapelex_core::mesh::{Companion, Format, Limits, MeshError, Pose, ReadContext, Source, TriangleSoup};
 use std::sync::Arc;
 
 /// A file of a request's body.
@@ -36,11 +36,26 @@ impl Part {
     }
 }
 
+/// The buffers of a request, and where each is found.
+#[derive(Debug)]
+pub(super) struct SentBuffers {
+    files: Vec<Part>,
+    index: BufferFiles,
+}
+
+impl SentBuffers {
+    /// These files.
+    pub(super) fn new(files: Vec<Part>) -> Self {
+        let index = BufferFiles::new(files.iter().map(|file| (file.place(), !file.packed)));
+        Self { files, index }
+    }
+}
+
 /// The files a glTF may refer to.
 #[derive(Clone, Debug)]
 pub(super) enum Buffers {
     /// All buffers of the request, to be searched by name.
-    Sent(Arc<Vec<Part>>),
+    Sent(Arc<SentBuffers>),
     /// Those of a stored shape, under the names the glTF uses.
     Stored(Vec<Companion>),
 }
@@ -98,6 +113,9 @@ pub(super) struct ReadMesh {
     pub(super) pose: Option<ShapePose>,
     pub(super) soup: TriangleSoup,
 }
+
+/// Bytes of the names of all buffers that one mesh refers to, at most.
+const MAX_COMPANION_NAMES: usize = 64 << 10;
 
 /// Bytes held per byte of the file while it is read, beside what the reader reserves for its arrays: small buffers and
 /// the allocator's slack.
@@ -205,6 +223,14 @@ impl UploadedMesh {
         }
     }
 
+    /// Reserves memory for what is kept of the mesh until its request ends.
+    ///
+    /// # Errors
+    /// `mesh_too_large` or `overloaded` where memory is short.
+    pub(super) fn hold(&self, bytes: u64) -> Result<(), Problem> {
+        Ok(self.memory.grow(bytes)?)
+    }
+
     /// Samples poses of an animated glTF.
     ///
     /// # Errors
@@ -236,20 +262,31 @@ impl UploadedMesh {
     /// part alone.
     ///
     /// # Errors
-    /// `mesh_too_large` or `overloaded` where memory is short.
+    /// `mesh_too_large` or `overloaded` where memory is short; `mesh_too_large` where their names are longer than any file
+    /// needs: each shape is stored with them.
     pub fn companions(&self, context: &ReadContext) -> Result<Vec<Companion>, Problem> {
-        let buffers = match &self.buffers {
+        let SentBuffers { files, index } = match &self.buffers {
             Buffers::Stored(companions) => return Ok(companions.clone()),
-            Buffers::Sent(buffers) if buffers.is_empty() => return Ok(Vec::new()),
-            Buffers::Sent(buffers) => buffers,
+            Buffers::Sent(buffers) if buffers.files.is_empty() => return Ok(Vec::new()),
+            Buffers::Sent(buffers) => buffers.as_ref(),
         };
-        let found = external_buffers(&self.bytes, &context.memory)?
-            .into_iter()
-            .filter_map(|uri| {
-                let part = uri.find(&self.folder, buffers, Part::place, |part| !part.packed)?;
-                Some(Companion::new(uri.path(), part.bytes.clone()))
-            });
-        Ok(found.collect())
+        let mut names = 0;
+        let mut companions = Vec::new();
+        for uri in external_buffers(&self.bytes, &context.memory)? {
+            let found = index.find(&self.folder, &uri).and_then(|i| files.get(i));
+            let Some(part) = found else { continue };
+            names += uri.path().len();
+            if names > MAX_COMPANION_NAMES {
+                return Err(MeshError::TooLarge {
+                    what: "bytes in the names of its buffers",
+                    found: names,
+                    limit: MAX_COMPANION_NAMES,
+                }
+                .into());
+            }
+            companions.push(Companion::new(uri.path(), part.bytes.clone()));
+        }
+        Ok(companions)
     }
 }
 

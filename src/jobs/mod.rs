@@ -23,7 +23,8 @@ pub use error::JobError;
 pub use live::LiveIndex;
 
 use crate::model::{ContentHash, Job, JobId, JobKind, JobState};
-use crate::store::Store;
+use crate::store::page::Page;
+use crate::store::{Store, StoreError};
 use jiff::Timestamp;
 use shapelex_core::cancel::Cancel;
 use shapelex_core::mesh::Limits;
@@ -264,19 +265,25 @@ impl Jobs {
         }
     }
 
-    /// Up to `limit` jobs, newest first, those older than `before` only.
+    /// Up to `limit` jobs, newest first, those older than `before` only, as
+    /// [`Store::page_of_jobs`](crate::store::Store::page_of_jobs) has them.
     ///
     /// # Errors
-    /// [`JobError::Store`].
-    pub fn list(&self, before: Option<JobId>, limit: usize) -> Result<Vec<Job>, JobError> {
-        let mut jobs = self.inner.store.list_jobs(before, limit)?;
+    /// Those of the store and of `take`.
+    pub fn page<E: From<StoreError>>(
+        &self,
+        before: Option<JobId>,
+        limit: usize,
+        take: impl FnMut(usize) -> Result<(), E>,
+    ) -> Result<Page<Job>, E> {
+        let mut page = self.inner.store.page_of_jobs(before, limit, take)?;
         let state = self.inner.state();
-        for job in &mut jobs {
+        for job in &mut page.items {
             if let Some(latest) = state.in_memory(job.id) {
                 *job = latest;
             }
         }
-        Ok(jobs)
+        Ok(page)
     }
 
     /// Cancels a job: at once where it waits; where it runs, at its next look, so it may still be `processing` in the

@@ -78,10 +78,20 @@ impl Store {
     /// # Errors
     /// [`StoreError::ReadOnly`], or the write's failure.
     pub fn forget_old_jobs(&self) -> Result<usize, StoreError> {
-        let jobs = self.list_jobs(None, usize::MAX)?;
         let mut batch = Batch::default();
-        for job in jobs.iter().filter(|j| j.state.is_finished()).skip(REMEMBERED) {
-            batch.delete(keys::job(job.id));
+        let (mut finished, mut before) = (0, None);
+        loop {
+            let page = self.page_of_jobs::<StoreError>(before, usize::MAX, |_| Ok(()))?;
+            for job in page.items.iter().filter(|job| job.state.is_finished()) {
+                finished += 1;
+                if finished > REMEMBERED {
+                    batch.delete(keys::job(job.id));
+                }
+            }
+            before = page.items.last().map(|job| job.id);
+            if !page.more {
+                break;
+            }
         }
         let forgotten = batch.writes.len();
         if forgotten > 0 {

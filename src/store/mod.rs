@@ -35,6 +35,7 @@ mod migrate;
 mod open;
 mod ordered_map;
 mod originals;
+pub mod page;
 mod payload;
 mod payload_jobs;
 mod private;

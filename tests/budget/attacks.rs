@@ -21,12 +21,14 @@ pub struct Target {
 /// Attacks, and says how it was answered. The round counts how often it was done before.
 type Attack = fn(&Target, usize) -> String;
 
-pub const ATTACKS: [(&str, Attack); 9] = [
+pub const ATTACKS: [(&str, Attack); 11] = [
     ("bodies held open", held_open),
     ("archives that unpack to much", bombs),
     ("small bodies that dribble", dribble),
     ("files of many spellings", spellings),
     ("heads of parts", heads),
+    ("long texts", long_texts),
+    ("lines nobody reads", unread_lines),
     ("answers nobody reads", unread),
     ("the largest parameters", largest_parameters),
     ("everything at once", mixed),
@@ -266,6 +268,38 @@ fn heads(target: &Target, _: usize) -> String {
         body.resize(30 * MIB, if i % 3 == 2 { b' ' } else { b'a' });
         target.post("/v1/query", FORM, &body)
     })
+}
+
+/// Texts of files that a careless reader repeats: in a problem, in the label of each pose, in the record of each.
+fn long_texts(target: &Target, _: usize) -> String {
+    let bytes = (target.memory_mib as usize * MIB / 12).min(40 * MIB);
+    let queries = [
+        files::gltf_of_wrong_types(bytes),
+        files::gltf_of_a_wrong_scene(bytes),
+        files::gltf_of_an_extension(bytes),
+    ];
+    let uploads = [
+        files::form("poses.gltf", &files::gltf_of_poses(bytes / 8, 0)),
+        files::form_of(&[("a.gltf", &files::gltf_of_poses(10, 2000)), ("x.bin", b"x")]),
+    ];
+    at_once(2 * (queries.len() + uploads.len()), |i| match i % 5 {
+        0..3 => target.post("/v1/query", "model/gltf+json", &queries[i % 5]),
+        other => target.post("/v1/classes/bean/shapes?poses=64", FORM, &uploads[other - 3]),
+    })
+}
+
+/// Batches whose answers are long, of clients that read none of them.
+fn unread_lines(target: &Target, _: usize) -> String {
+    let mesh = meshes::off("bean", 1);
+    let names: Vec<String> = (0..40).map(|i| format!("{i}.off")).collect();
+    let zip = files::zip(names.iter().map(|name| (name.as_str(), mesh.as_ref())));
+    let mut held = Vec::new();
+    for _ in 0..target.connections.min(200) {
+        let opened = target.open("/v1/query/batch?details=samples", "application/zip", zip.len());
+        held.extend(opened.ok().filter(|mut stream| stream.write_all(&zip).is_ok()));
+    }
+    std::thread::sleep(Duration::from_secs(3));
+    format!("{} connections", held.len())
 }
 
 /// Asks for large answers and reads none of them.

@@ -99,12 +99,79 @@ pub fn gltf_of_objects(bytes: usize) -> Vec<u8> {
     text.into_bytes()
 }
 
+/// A zip of these files.
+pub fn zip<'f>(files: impl Iterator<Item = (&'f str, &'f [u8])>) -> Vec<u8> {
+    let mut writer = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, bytes) in files {
+        writer
+            .start_file(name, zip::write::SimpleFileOptions::default())
+            .unwrap();
+        writer.write_all(bytes).unwrap();
+    }
+    writer.finish().unwrap().into_inner()
+}
+
+/// A glTF with a string of so many bytes where a number belongs.
+pub fn gltf_of_wrong_types(bytes: usize) -> Vec<u8> {
+    let text = "\u{7f}".repeat(bytes);
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],"accessors":[{{"count":"{text}"}}]}}"#
+    )
+    .into_bytes()
+}
+
+/// The same in the place of the scene.
+pub fn gltf_of_a_wrong_scene(bytes: usize) -> Vec<u8> {
+    let text = "\u{7f}".repeat(bytes);
+    format!(r#"{{"asset":{{"version":"2.0"}},"scene":"{text}"}}"#).into_bytes()
+}
+
+/// A glTF that requires an extension with a name of so many bytes.
+pub fn gltf_of_an_extension(bytes: usize) -> Vec<u8> {
+    let text = "x".repeat(bytes);
+    format!(r#"{{"asset":{{"version":"2.0"}},"extensionsRequired":["{text}"]}}"#).into_bytes()
+}
+
+/// A moving tetrahedron whose clip has a name of so many bytes, and which names so many buffers by long paths.
+pub fn gltf_of_poses(name: usize, buffers: usize) -> Vec<u8> {
+    const DATA: &str = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAABAAIAAAACAAMAAAADAAEAAQADAAIAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AACAPwAAgD8=";
+    let path = "folder/".repeat(500);
+    let more: String = (0..buffers)
+        .map(|i| format!(r#",{{"byteLength":1,"uri":"{path}{i}/x.bin"}}"#))
+        .collect();
+    let name = "n".repeat(name);
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"}},
+          {{"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}},
+          {{"bufferView":2,"componentType":5126,"count":2,"type":"SCALAR"}},
+          {{"bufferView":3,"componentType":5126,"count":2,"type":"VEC3"}}],
+        "bufferViews":[{{"buffer":0,"byteOffset":0,"byteLength":48}},{{"buffer":0,"byteOffset":48,"byteLength":24}},
+          {{"buffer":0,"byteOffset":72,"byteLength":8}},{{"buffer":0,"byteOffset":80,"byteLength":24}}],
+        "buffers":[{{"byteLength":104,"uri":"data:application/octet-stream;base64,{DATA}"}}{more}],
+        "animations":[{{"name":"{name}","channels":[{{"sampler":0,"target":{{"node":0,"path":"translation"}}}}],
+          "samplers":[{{"input":2,"output":3}}]}}]}}"#
+    )
+    .into_bytes()
+}
+
 /// A form of one file.
 pub fn form(name: &str, bytes: &[u8]) -> Vec<u8> {
-    let mut body =
-        format!("--xyz\r\ncontent-disposition: form-data; name=\"file\"; filename=\"{name}\"\r\n\r\n")
-            .into_bytes();
-    body.extend_from_slice(bytes);
-    body.extend_from_slice(b"\r\n--xyz--\r\n");
+    form_of(&[(name, bytes)])
+}
+
+/// A form of these files.
+pub fn form_of(files: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut body = Vec::new();
+    for (name, bytes) in files {
+        let head =
+            format!("--xyz\r\ncontent-disposition: form-data; name=\"file\"; filename=\"{name}\"\r\n\r\n");
+        body.extend_from_slice(head.as_bytes());
+        body.extend_from_slice(bytes);
+        body.extend_from_slice(b"\r\n");
+    }
+    body.extend_from_slice(b"--xyz--\r\n");
     body
 }

@@ -14,6 +14,7 @@ mod flow;
 mod gltf_buffers;
 mod harness;
 mod limits;
+mod long_texts;
 mod meshes;
 mod operation;
 mod promises;

@@ -218,6 +218,37 @@ async fn a_name_that_was_bound_to_this_machine_reads_nothing() {
         assert_eq!(get("10.244.1.7:7345", path).await.status, 200, "{path}");
     }
     assert_eq!(get("LOCALHOST.:1", "/v1/classes").await.status, 200);
+    for host in ["[::1].evil.test", "[::1]evil", "localhost:x", "localhost:99999"] {
+        get(host, "/v1/classes").await.fails(421, "misdirected_request");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_page_on_another_port_of_a_configured_name_is_a_page_of_another_site() {
+    let app = App::with(|c| c.hosts = vec!["shapes.example".to_owned()]);
+    let post = |origin: &'static str, name: &str| {
+        app.send(
+            Request::post("/v1/classes")
+                .header("host", "shapes.example:7345")
+                .header("origin", origin)
+                .header("content-type", "application/json")
+                .body(Body::from(json!({"name": name}).to_string()))
+                .unwrap(),
+        )
+    };
+    for origin in [
+        "http://shapes.example:8080",
+        "https://shapes.example:8443",
+        "http://a@shapes.example:7345",
+    ] {
+        post(origin, "evil").await.fails(403, "cross_site_request");
+    }
+    for (origin, name) in [
+        ("http://shapes.example:7345", "same"),
+        ("https://shapes.example", "proxy"),
+    ] {
+        assert_eq!(post(origin, name).await.status, 201, "{origin}");
+    }
 }
 
 #[test]

@@ -114,7 +114,7 @@ fn what_comes_out_is_reserved_while_it_does_and_stops_when_asked() {
                 cancel,
                 memory: &memory,
             };
-            let unpacked = unpack_within(kind, &archive, &roomy, &unpacking);
+            let unpacked = unpack_within(kind, &archive, &mut roomy.clone(), &unpacking);
             (unpacked.map_err(|p| p.code), memory.bytes())
         };
         let (unpacked, reserved) = attempt(&MemoryBudget::new(1 << 20), &Cancel::new());
@@ -138,6 +138,27 @@ fn what_comes_out_is_reserved_while_it_does_and_stops_when_asked() {
             "{kind:?}"
         );
     }
+}
+
+#[test]
+fn what_is_passed_over_counts_against_the_limits_of_all_archives_of_a_request() {
+    let archive = gzip(&tar_of(&[(".hidden", &[b'x'; 6000]), ("a.off", &[b'y'; 300])]));
+    let mut left = ArchiveLimits {
+        max_members: 10,
+        max_bytes: 40_000,
+    };
+    let unpacking = Unpacking {
+        cancel: &Cancel::new(),
+        memory: &MemoryBudget::unlimited().reservation(),
+    };
+    let mut unpacked = || unpack_within(ArchiveKind::TarGz, &archive, &mut left, &unpacking);
+    assert_eq!(unpacked().unwrap().len(), 1);
+    let refused = (0..20).find_map(|_| unpacked().err().map(|problem| problem.code));
+    assert!(
+        matches!(refused, Some(Code::ArchiveTooLarge | Code::TooManyFiles)),
+        "{refused:?}"
+    );
+    assert!(left.max_members <= 8 && left.max_bytes < 34_000, "{left:?}");
 }
 
 #[test]

@@ -18,7 +18,7 @@ pub enum ScopeDto {
     Stale,
     /// Every class.
     All,
-    /// These, by id or name, and no others: those keep what the index has of them.
+    /// These, by id or name, at most 1000, and no others: those keep what the index has of them.
     Classes(Vec<String>),
 }
 

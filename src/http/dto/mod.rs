@@ -14,6 +14,7 @@ pub mod shape;
 pub mod snapshot;
 
 use crate::http::problem::{Code, Problem};
+use crate::store;
 use base64::Engine;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use serde::{Deserialize, Serialize};
@@ -25,7 +26,7 @@ use utoipa::{IntoParams, ToSchema};
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct PageQuery {
-    /// How many items at most, 1 to 1000; 100 where it is left out.
+    /// How many items at most, 1 to 1000; 100 where it is left out. A page of long items has fewer.
     #[param(minimum = 1, maximum = 1000, default = 100)]
     pub limit: Option<usize>,
     /// `next_cursor` of the page before; the first page where it is left out.
@@ -98,12 +99,23 @@ impl<T> Page<T> {
     ) -> Self {
         let more = found.len() > limit;
         found.truncate(limit);
-        let next_cursor = found
+        Self::of(list, store::page::Page { items: found, more }, id, to)
+    }
+
+    /// Makes a page of one of the store's.
+    pub fn of<S>(
+        list: &str,
+        page: store::page::Page<S>,
+        id: impl Fn(&S) -> String,
+        to: impl Fn(S) -> T,
+    ) -> Self {
+        let next_cursor = page
+            .items
             .last()
-            .filter(|_| more)
+            .filter(|_| page.more)
             .map(|last| URL_SAFE_NO_PAD.encode(format!("{list}{CURSOR_SEPARATOR}{}", id(last))));
         Self {
-            items: found.into_iter().map(to).collect(),
+            items: page.items.into_iter().map(to).collect(),
             next_cursor,
         }
     }

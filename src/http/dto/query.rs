@@ -222,6 +222,19 @@ pub struct QueryAnswer {
     pub timings_ms: BTreeMap<String, f64>,
 }
 
+impl QueryAnswer {
+    /// Bytes that its text takes, at most: numbers have up to 25 characters, classes and shapes a dozen numbers and a name.
+    pub fn bytes(&self) -> u64 {
+        let signals = self.samples.iter().flatten().map(|view| {
+            let numbers: usize = view.signals.iter().map(Vec::len).sum();
+            numbers + view.vertices.len()
+        });
+        let numbers = signals.sum::<usize>() + self.eigenvalues.len();
+        let entries = self.classes.len() + self.nearest_shapes.len() + self.possible_classes.len();
+        25 * numbers as u64 + 1024 * (entries + self.not_compared.len()) as u64 + (16 << 10)
+    }
+}
+
 /// One line of a batch's answer. The last line has only a summary.
 #[derive(Clone, Debug, Serialize, ToSchema)]
 #[serde(untagged)]

@@ -9,6 +9,7 @@ use crate::http::dto::{Page, PageQuery};
 use crate::http::extract::{ApiPath, ApiQuery, OptionalJson};
 use crate::http::problem::{Code, Problem};
 use crate::http::problem_sets::{JSON, PAGE, WRITE};
+use crate::http::request_memory::{counted_event, page_memory};
 use crate::http::route::Route;
 use crate::http::state::Parts;
 use crate::jobs::JobError;
@@ -175,6 +176,9 @@ fn parameters(parts: &Parts, body: &StartReindex) -> Result<Option<Parameters>, 
     Ok(Some(parameters))
 }
 
+/// Classes that a reindex may name. Jobs are kept with their classes, while they wait in memory, too.
+const MAX_NAMED: usize = 1000;
+
 fn scope(parts: &Parts, scope: ScopeDto) -> Result<ReindexScope, Problem> {
     Ok(match scope {
         ScopeDto::Stale => ReindexScope::Stale,
@@ -185,6 +189,17 @@ fn scope(parts: &Parts, scope: ScopeDto) -> Result<ReindexScope, Problem> {
                 "scope.classes names no class; name some, or use \"all\" or \"stale\"",
             )
             .with("name", "scope.classes"));
+        }
+        ScopeDto::Classes(classes) if classes.len() > MAX_NAMED => {
+            return Err(Problem::new(
+                Code::InvalidField,
+                format!(
+                    "scope.classes names {} classes, at most {MAX_NAMED}; use \"all\" or \"stale\", or several reindexes",
+                    classes.len()
+                ),
+            )
+            .with("name", "scope.classes")
+            .with("limit", MAX_NAMED));
         }
         ScopeDto::Classes(classes) => {
             let mut ids = Vec::with_capacity(classes.len());
@@ -211,13 +226,16 @@ pub async fn list_jobs(
     ApiQuery(page): ApiQuery<PageQuery>,
 ) -> Result<Json<Page<JobDto>>, Problem> {
     let (limit, before) = (page.limit()?, page.after::<JobId>("jobs")?);
-    let found = state
-        .blocking(move |s| Ok(s.jobs.list(before, limit + 1)?))
+    let (found, _memory) = state
+        .blocking(move |s| {
+            let memory = s.memory.reservation();
+            let found = s.jobs.page(before, limit, page_memory(&memory))?;
+            Ok((found, memory))
+        })
         .await?;
-    Ok(Json(Page::cut(
+    Ok(Json(Page::of(
         "jobs",
         found,
-        limit,
         |job| job.id.to_string(),
         Into::into,
     )))
@@ -287,8 +305,13 @@ pub async fn follow_job(
     }
     let stopping = state.stopping.clone();
     let mut events = Events::after(seen);
+    let memory = state.memory.reservation();
     let events = until_finished(WatchStream::new(changes))
-        .map(move |job| Ok::<_, Infallible>(events.event(job)))
+        .map(move |job| events.event(job))
+        // A client whose events find no memory connects again, as one does whose connection breaks.
+        .scan(memory, |memory, (event, bytes)| {
+            std::future::ready(counted_event(memory, bytes).then_some(Ok::<_, Infallible>(event)))
+        })
         .take_until(stopping.cancelled_owned());
     Ok(Sse::new(events).keep_alive(KeepAlive::default()).into_response())
 }
@@ -311,7 +334,8 @@ impl Events {
         Self { last, first: true }
     }
 
-    fn event(&mut self, job: Job) -> Event {
+    /// The event, and the bytes of its text.
+    fn event(&mut self, job: Job) -> (Event, u64) {
         let now = u64::try_from(jiff::Timestamp::now().as_microsecond()).unwrap_or(0);
         let at = ended_at(&job).unwrap_or(now);
         self.last = at.max(self.last.saturating_add(1));
@@ -322,10 +346,13 @@ impl Events {
         {
             members.remove("parameters");
         }
-        Event::default()
+        let text = body.to_string();
+        let bytes = text.len() as u64;
+        let event = Event::default()
             .event("progress")
             .id(self.last.to_string())
-            .data(body.to_string())
+            .data(text);
+        (event, bytes)
     }
 }
 

@@ -20,10 +20,10 @@ use crate::http::stored;
 use crate::http::upload::{self, Upload};
 use crate::jobs::LiveIndex;
 use crate::model::Scope;
-use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
+use bytes::Bytes;
 use std::sync::Arc;
 use utoipa_axum::routes;
 
@@ -92,8 +92,14 @@ pub async fn query_mesh(
     let poses = poses_of(&state, &options)?;
     let (live, upload, left) = begin(&state, &caller, &options, request).await?;
     let mesh = poses.only(upload::only_mesh(upload)?)?;
-    let answer = run_query(&state, Patience::Bounded, live, mesh, options).await?;
-    let mut response = Json(answer).into_response();
+    let rendered = run_query(&state, Patience::Bounded, live, mesh, options, |answer| {
+        text_of(&answer)
+    })
+    .await?;
+    let kind = [(header::CONTENT_TYPE, "application/json")];
+    // Counted anew until the client has read it.
+    drop(rendered.memory);
+    let mut response = (kind, rendered.text).into_response();
     if let Some(left) = left {
         left.tell(&mut response);
     }
@@ -190,4 +196,9 @@ fn answerable(state: &AppState) -> Result<Arc<LiveIndex>, Problem> {
         return Err(index_empty());
     }
     Ok(live)
+}
+
+fn text_of(answer: &QueryAnswer) -> Bytes {
+    // Strings, numbers and maps with string keys always serialise.
+    serde_json::to_vec(answer).unwrap_or_default().into()
 }

@@ -12,7 +12,7 @@ use crate::http::poses::check_poses;
 use crate::http::problem::{Code, Problem};
 use crate::http::problem_from::recovery_mode;
 use crate::http::problem_sets::{MESH, PAGE, POOL, UPLOAD, WRITE};
-use crate::http::request_memory::file_body;
+use crate::http::request_memory::{file_body, page_memory};
 use crate::http::route::Route;
 use crate::http::state::Parts;
 use crate::http::{checked, upload};
@@ -196,21 +196,19 @@ pub async fn list_shapes(
     ApiQuery(page): ApiQuery<PageQuery>,
 ) -> Result<Json<Page<ShapeDto>>, Problem> {
     let limit = page.limit()?;
-    let (list, found) = state
+    let (list, found, _memory) = state
         .blocking(move |s| {
             let class = find_class(&s.store, &class)?;
             let list = format!("shapes of {}", class.id);
             let after = page.after::<ShapeId>(&list)?;
-            Ok((list, s.store.list_shapes(class.id, after, limit + 1)?))
+            let memory = s.memory.reservation();
+            let found = s
+                .store
+                .page_of_shapes(class.id, after, limit, page_memory(&memory))?;
+            Ok((list, found, memory))
         })
         .await?;
-    Ok(Json(Page::cut(
-        &list,
-        found,
-        limit,
-        |s| s.id.to_string(),
-        Into::into,
-    )))
+    Ok(Json(Page::of(&list, found, |s| s.id.to_string(), Into::into)))
 }
 
 /// Show a shape
