@@ -272,7 +272,7 @@ fn heads(target: &Target, _: usize) -> String {
 
 /// Texts of files that a careless reader repeats: in a problem, in the label of each pose, in the record of each.
 fn long_texts(target: &Target, _: usize) -> String {
-    let bytes = (target.memory_mib as usize * MIB / 12).min(40 * MIB);
+    let bytes = (target.memory_mib as usize * MIB / 6).min(60 * MIB);
     let queries = [
         files::gltf_of_wrong_types(bytes),
         files::gltf_of_a_wrong_scene(bytes),

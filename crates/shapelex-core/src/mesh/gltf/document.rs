@@ -117,13 +117,11 @@ impl<'d> Document<'d> {
         let scene = match top.scene {
             Some(raw) => {
                 let _message = message(raw, context)?;
-                Some(serde_json::from_str::<Index>(raw.get()))
+                let index = serde_json::from_str::<Index>(raw.get());
+                Some(index.map_err(|e| malformed(format!("scene: {}", reason(&e))))?)
             }
             None => None,
         };
-        let scene = scene
-            .transpose()
-            .map_err(|e| malformed(format!("scene: {}", reason(&e))))?;
         let buffers = list("buffer", top.buffers)?;
         let views = list("buffer view", top.buffer_views)?;
         Ok(Self {
@@ -194,8 +192,10 @@ fn message<'c>(raw: &RawValue, context: &'c ReadContext) -> Result<Option<Held<'
     if raw.get().len() <= SHORT_ELEMENT {
         return Ok(None);
     }
-    let uri = serde_json::from_str::<OnlyUri<'_>>(raw.get()).ok();
-    let uri = uri.and_then(|only| only.uri).map_or(0, |uri| uri.get().len());
+    // Only an object has one, and reading anything else as an object would make such a message.
+    let object = Some(raw.get()).filter(|text| text.starts_with('{'));
+    let only = object.and_then(|text| serde_json::from_str::<OnlyUri<'_>>(text).ok());
+    let uri = only.and_then(|only| only.uri).map_or(0, |uri| uri.get().len());
     let length = raw.get().len() - uri;
     Ok(Some(context.memory.hold((length * MESSAGE_BYTES) as u64)?))
 }
