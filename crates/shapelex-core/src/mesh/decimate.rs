@@ -81,7 +81,7 @@ pub(super) fn simplify_to(
             order_along_curve(&mut mesh.vertices, &mut mesh.faces, work)?;
         }
         if edges.inconsistent > 0 {
-            orient(mesh.vertices.len(), &mut mesh.faces, work)?;
+            orient(mesh.vertices.len(), &mut mesh.faces, &work)?;
         }
         for (options, how) in [
             (SimplifyOptions::RegularizeLight, Simplified::ByCollapse),

@@ -25,6 +25,7 @@ pub mod obj;
 pub mod off;
 mod options;
 pub mod orient;
+pub mod outward;
 mod patch;
 mod pieces;
 pub mod ply;

@@ -1,8 +1,7 @@
 //! Making neighbouring faces run the same way round.
 
-use super::MeshError;
 use super::edges::for_each_edge;
-use super::work::{Watch, Work};
+use super::work::Watch;
 
 /// Reverses faces until neighbours across every edge of two faces agree, as far as the surface can be oriented.
 ///
@@ -11,15 +10,19 @@ use super::work::{Watch, Work};
 /// cannot be oriented (a Moebius strip) a line of disagreement is left. Linear.
 ///
 /// # Errors
-/// [`MeshError::Cancelled`], [`MeshError::Memory`].
-pub(super) fn orient(vertex_count: usize, faces: &mut [[u32; 3]], work: Work) -> Result<(), MeshError> {
+/// Those of the watch.
+pub(super) fn orient<W: Watch>(
+    vertex_count: usize,
+    faces: &mut [[u32; 3]],
+    work: &W,
+) -> Result<(), W::Error> {
     const NONE: u32 = u32::MAX;
     const REVERSED: u8 = 1;
     const SEEN: u8 = 2;
     let _across = work.hold(faces.len(), 3 * size_of::<u32>())?;
     // The face across each half-edge, doubled, and one more where the two run the same way there, a disagreement.
     let mut across = vec![NONE; 3 * faces.len()];
-    for_each_edge(vertex_count, faces, &work, |_, _, group| {
+    for_each_edge(vertex_count, faces, work, |_, _, group| {
         if let [x, y] = *group {
             let same = u32::from(x & 1 == y & 1);
             across[(x >> 1) as usize] = (y >> 1) / 3 * 2 + same;
@@ -61,7 +64,7 @@ pub(super) fn orient(vertex_count: usize, faces: &mut [[u32; 3]], work: Work) ->
 #[cfg(test)]
 mod tests {
     use super::super::edges::edge_census;
-    use super::*;
+    use super::super::work::Work;
     use crate::cancel::Cancel;
     use crate::memory::MemoryBudget;
 
@@ -72,7 +75,7 @@ mod tests {
             cancel: &cancel,
             memory: &memory,
         };
-        super::orient(vertex_count, faces, work).unwrap();
+        super::orient(vertex_count, faces, &work).unwrap();
     }
 
     #[test]

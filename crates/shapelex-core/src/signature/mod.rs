@@ -3,12 +3,14 @@
 pub mod descriptor;
 pub mod grid;
 pub mod hks;
+pub mod local;
 pub mod normalise;
 pub mod sample;
 pub mod si_hks;
 pub mod wks;
 
 pub use descriptor::{Descriptor, DescriptorParameters, describe_vertices};
+pub use local::{LocalParameters, local_signatures};
 pub use normalise::Normalisation;
 
 use faer::Mat;
