@@ -1,10 +1,10 @@
 //! `shapelex evaluate`: how often the method is right on a folder per class.
 
 use super::evaluate_args::{EvaluateArgs, ProtocolName};
-use super::evaluate_checks::check;
+use super::evaluate_checks::{check, check_queries};
 use super::evaluate_describe::{describe, keep_classes};
 use super::evaluate_figures::Figures;
-use super::folders::labelled_files;
+use super::folders::{LabelledFile, labelled_files};
 use super::progress::Progress;
 use super::refused::Refused;
 use super::{CliError, evaluation_report, output};
@@ -72,19 +72,26 @@ pub struct Outcome {
 pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
     let began = Instant::now();
     let parameters = args.parameters.parameters()?;
-    let files = labelled_files(&args.dir)?;
-    let same = check(args, &files, &parameters)?;
+    let trained = labelled_files(&args.dir)?;
+    let (asked, same) = match &args.queries {
+        Some(dir) => {
+            let asked = labelled_files(dir)?;
+            let same = check_queries(args, dir, &trained, &asked)?;
+            (asked, same)
+        }
+        None => (Vec::new(), check(args, &trained, &parameters)?),
+    };
+    let files: Vec<LabelledFile> = trained.iter().chain(&asked).cloned().collect();
     let figures = Figures::new(args.figures.as_deref(), args.poses, &files)?;
-    let (mut shapes, refused) = describe(&files, args.poses, &parameters);
-    let (classes, left_out) = keep_classes(&mut shapes, args.min_shapes);
-    if classes.len() < 2 {
-        return Err(CliError::Failed(format!(
-            "{}: {} classes with at least {} usable shapes; an evaluation needs two",
-            args.dir.display(),
-            classes.len(),
-            args.min_shapes
-        )));
-    }
+    let (mut shapes, mut refused) = describe(&trained, args.poses, &parameters);
+    let (classes, left_out) = usable(args, &mut shapes)?;
+    let (queries, refused_queries) = match &args.queries {
+        Some(_) => describe(&asked, args.poses, &parameters),
+        None => Default::default(),
+    };
+    let queried = queries.len();
+    shapes.extend(queries);
+    refused.extend(refused_queries);
     let mut report = Report {
         classes,
         shapes: shapes.len(),
@@ -103,10 +110,40 @@ pub fn run(args: &EvaluateArgs, json: bool) -> Result<(), CliError> {
         open_set: None,
         seconds: 0.0,
     };
-    for &name in &args.protocol {
-        run_protocol(name, args, (&shapes, &same), &figures, &mut report)?;
+    if args.queries.is_some() {
+        let protocol = Protocol::TrainQuery { queries: queried };
+        run_rounds_of(protocol, (&shapes, &same), &figures, &mut report)?;
+    } else {
+        for &name in &args.protocol {
+            run_protocol(name, args, (&shapes, &same), &figures, &mut report)?;
+        }
     }
     report.seconds = began.elapsed().as_secs_f64();
+    show(args, report, json)
+}
+
+/// The classes with enough usable shapes, which stay, and the names of the others.
+fn usable(
+    args: &EvaluateArgs,
+    shapes: &mut Vec<LabelledShape>,
+) -> Result<(BTreeMap<String, usize>, Vec<String>), CliError> {
+    let least = if args.queries.is_some() {
+        1
+    } else {
+        args.min_shapes
+    };
+    let (classes, left_out) = keep_classes(shapes, least);
+    if classes.len() < 2 {
+        return Err(CliError::Failed(format!(
+            "{}: {} classes with at least {least} usable shapes; an evaluation needs two",
+            args.dir.display(),
+            classes.len(),
+        )));
+    }
+    Ok((classes, left_out))
+}
+
+fn show(args: &EvaluateArgs, mut report: Report, json: bool) -> Result<(), CliError> {
     if json {
         output::json(&report)?;
     } else {
@@ -144,6 +181,16 @@ fn run_protocol(
         }
         return Ok(());
     };
+    run_rounds_of(protocol, (shapes, same), figures, report)
+}
+
+/// Runs a protocol that is about one right class per query.
+fn run_rounds_of(
+    protocol: Protocol,
+    (shapes, same): (&[LabelledShape], &[Vec<String>]),
+    figures: &Figures<'_>,
+    report: &mut Report,
+) -> Result<(), CliError> {
     let progress = Progress::new(protocol.name(), 0);
     let evaluation = evaluate(
         shapes,

@@ -28,6 +28,9 @@ pub struct EvaluateArgs {
     /// Folder with a folder per class, which may have subfolders
     #[arg(value_name = "DIR")]
     pub dir: PathBuf,
+    /// Query the shapes of this folder, a folder per class, and let all of DIR train; no split then
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["protocol", "min_shapes", "draws", "folds", "split_seed"])]
+    pub queries: Option<PathBuf>,
     /// How shapes are split into training shapes and queries; may be repeated
     #[arg(long, value_enum, value_name = "PROTOCOL",
           default_values_t = [ProtocolName::LeaveOneOut, ProtocolName::EvenOdd, ProtocolName::OneShot,

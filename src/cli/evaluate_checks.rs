@@ -75,6 +75,43 @@ pub fn check(
     Ok(same)
 }
 
+/// As [`check`], where one folder trains and another is queried.
+///
+/// # Errors
+/// [`CliError::Usage`] with what does not fit.
+pub fn check_queries(
+    args: &EvaluateArgs,
+    queries: &Path,
+    trained: &[LabelledFile],
+    asked: &[LabelledFile],
+) -> Result<Vec<Vec<String>>, CliError> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for file in trained {
+        *counts.entry(&file.class).or_default() += 1;
+    }
+    let (dir, names) = (args.dir.display(), || {
+        counts.keys().copied().collect::<Vec<_>>().join(", ")
+    });
+    if counts.len() < 2 {
+        return Err(CliError::Usage(format!(
+            "{dir}: there is one class, {}; an evaluation needs two or more to choose from",
+            names()
+        )));
+    }
+    if let Some(file) = asked
+        .iter()
+        .find(|file| !counts.contains_key(file.class.as_str()))
+    {
+        return Err(CliError::Usage(format!(
+            "--queries {}: the class '{}' does not train; {dir} has {}",
+            queries.display(),
+            file.class,
+            names()
+        )));
+    }
+    groups(&args.same, &args.dir, &counts)
+}
+
 /// As many shapes as a file can give.
 fn most_poses(file: &LabelledFile, poses: Option<usize>) -> usize {
     let extension = file

@@ -3,7 +3,7 @@
 use super::evaluate::{Outcome, Report};
 use super::output::table;
 use shapelex_eval::benchmark::retrieval::RetrievalOutcome;
-use shapelex_eval::benchmark::{AtLevel, OpenSet, Share};
+use shapelex_eval::benchmark::{AtLevel, Estimate, OpenSet, Share};
 
 /// Confusion matrices with more classes than this do not fit a screen; they are listed instead.
 const MATRIX_CLASSES: usize = 26;
@@ -127,13 +127,26 @@ fn summary(report: &Report) -> String {
                 e.correct.to_string(),
                 e.total.to_string(),
                 format!("{:.2} %", 100.0 * o.top1),
+                estimate(&e.measures.nearest_neighbour),
+                estimate(&e.measures.first_tier),
+                estimate(&e.measures.dcg),
             ]
         })
         .collect();
-    format!(
-        "\n{}",
-        table(&["protocol", ">right", ">queries", ">top-1"], &rows)
-    )
+    let header = [
+        "protocol",
+        ">right",
+        ">queries",
+        ">top-1",
+        ">nearest neighbour (95 %)",
+        ">first tier (95 %)",
+        ">DCG (95 %)",
+    ];
+    format!("\n{}", table(&header, &rows))
+}
+
+fn estimate(estimate: &Estimate) -> String {
+    format!("{:.3} ({:.3}–{:.3})", estimate.mean, estimate.low, estimate.high)
 }
 
 fn outcome(outcome: &Outcome) -> String {
@@ -146,7 +159,10 @@ fn outcome(outcome: &Outcome) -> String {
         100.0 * outcome.top1
     );
     if e.not_queried > 0 {
-        text += &format!("; {} not queried, alone in their class", e.not_queried);
+        text += &format!(
+            "; {} not queried, as no other shape of their class trains",
+            e.not_queried
+        );
     }
     text += "\n";
     text += &confusion(outcome);

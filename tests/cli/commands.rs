@@ -200,6 +200,31 @@ fn evaluate_tells_the_classes_of_a_small_zoo_apart_and_names_refused_files() {
         assert_eq!(counted, protocol["total"].as_u64().unwrap());
     }
 
+    let asked = [
+        "evaluate",
+        "shapes",
+        "--queries",
+        "shapes",
+        "--set",
+        "atoms=32",
+        "--json",
+    ];
+    let output = run(dir.path(), &asked);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let report = last_json(std::str::from_utf8(&output.stdout).unwrap());
+    let [protocol] = report["protocols"].as_array().unwrap().as_slice() else {
+        panic!("{report}");
+    };
+    assert_eq!(
+        (&protocol["name"], &protocol["total"]),
+        (&"train/query".into(), &12.into())
+    );
+    assert_eq!(protocol["top1"], 1.0);
+    for measure in ["nearest_neighbour", "first_tier", "dcg"] {
+        let value = |of| protocol["measures"][measure][of].as_f64().unwrap();
+        assert!(value("low") <= value("mean") && value("mean") == 1.0 && value("high") == 1.0);
+    }
+
     let class = std::fs::read_dir(dir.path().join("shapes"))
         .unwrap()
         .next()

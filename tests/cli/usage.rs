@@ -268,6 +268,7 @@ fn evaluate_finds_what_does_not_fit_before_it_describes_anything() {
         "deep/cat/2.obj",
         "deep/dog/1.obj",
         "deep/dog/2.obj",
+        "single/cat/1.obj",
     ] {
         let file = path.join(file);
         std::fs::create_dir_all(file.parent().unwrap()).unwrap();
@@ -285,6 +286,20 @@ fn evaluate_finds_what_does_not_fit_before_it_describes_anything() {
         (&["evaluate", "deep", "--protocol", "open-set"], "19"),
         (&["evaluate", "deep", "--draws", "0"], "--draws"),
         (&["evaluate", "nowhere"], "no such folder"),
+        (&["evaluate", "deep", "--queries", "nowhere"], "no such folder"),
+        (&["evaluate", "deep", "--queries", "flat"], "'a' does not train"),
+        (
+            &["evaluate", "single", "--queries", "single"],
+            "needs two or more",
+        ),
+        (
+            &["evaluate", "deep", "--queries", "deep", "--same", "cat,cow"],
+            "no class 'cow'",
+        ),
+        (
+            &["evaluate", "deep", "--queries", "deep", "--folds", "2"],
+            "cannot be used with",
+        ),
         (&["evaluate", "flat/a.obj"], "this is a file"),
         (&["benchmark", "nowhere"], "no such file or folder"),
     ] {

@@ -1,5 +1,6 @@
 //! Accuracy on labelled shapes: who was taken for whom.
 
+use super::class_measures::ClassMeasures;
 use super::protocol::{Protocol, Round, rounds};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -51,6 +52,8 @@ pub struct Evaluation {
     pub correct: usize,
     /// Queries.
     pub total: usize,
+    /// Nearest neighbour, first tier and DCG of the lists of classes.
+    pub measures: ClassMeasures,
     /// Every query, the worst first.
     pub queries: Vec<QueryResult>,
     /// True class → answered class → count.
@@ -99,9 +102,10 @@ pub fn evaluate(
         Protocol::LeaveOneOut | Protocol::KFold { .. } => {
             shapes.len() - rounds.iter().map(|r| r.query.len()).sum::<usize>()
         }
+        Protocol::TrainQuery { queries: asked } => asked - queries.len(),
         Protocol::EvenOdd | Protocol::OneShot { .. } => 0,
     };
-    Ok(sum_up(protocol, queries, single))
+    Ok(sum_up(protocol, queries, single, same))
 }
 
 /// Models by the shapes they were learnt from.
@@ -220,7 +224,13 @@ pub fn judge(class: &str, name: &str, ranked: Vec<(String, f64)>, same: &[Vec<St
     }
 }
 
-fn sum_up(protocol: Protocol, mut queries: Vec<QueryResult>, not_queried: usize) -> Evaluation {
+fn sum_up(
+    protocol: Protocol,
+    mut queries: Vec<QueryResult>,
+    not_queried: usize,
+    same: &[Vec<String>],
+) -> Evaluation {
+    let measures = ClassMeasures::of(&queries, same);
     queries.sort_by(|a, b| {
         b.error_margin
             .total_cmp(&a.error_margin)
@@ -241,6 +251,7 @@ fn sum_up(protocol: Protocol, mut queries: Vec<QueryResult>, not_queried: usize)
         protocol,
         correct,
         total: queries.len(),
+        measures,
         queries,
         confusion,
         not_queried,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// How many answers the E-measure looks at.
 const E_MEASURE_ANSWERS: usize = 32;
 /// Standard normal quantile of 97.5 %.
-const Z: f64 = 1.959_963_984_540_054;
+pub(super) const Z: f64 = 1.959_963_984_540_054;
 
 /// Recalls at which precision is reported: 0.05, 0.1, …, 1.
 pub const RECALLS: usize = 20;

@@ -1,5 +1,6 @@
 //! How right the method is on labelled shapes.
 
+pub mod class_measures;
 pub mod deform;
 pub mod evaluate;
 pub mod measures;
@@ -14,6 +15,7 @@ pub mod robustness;
 pub mod specimen;
 pub mod unit;
 
+pub use class_measures::{ClassMeasures, Estimate};
 pub use evaluate::{Evaluation, LabelledShape, QueryResult, evaluate};
 pub use measures::{RetrievalMeasures, wilson};
 pub use method::Method;

@@ -29,6 +29,11 @@ pub enum Protocol {
         /// Seed of the shuffle.
         seed: u64,
     },
+    /// The last shapes are queried, all before them train.
+    TrainQuery {
+        /// How many are queried.
+        queries: usize,
+    },
 }
 
 impl Protocol {
@@ -39,6 +44,7 @@ impl Protocol {
             Self::EvenOdd => "even/odd",
             Self::OneShot { .. } => "one-shot",
             Self::KFold { .. } => "k-fold",
+            Self::TrainQuery { .. } => "train/query",
         }
     }
 }
@@ -98,6 +104,10 @@ pub fn rounds(protocol: Protocol, classes: &[&str], names: &[&str]) -> Vec<Round
                 split(&|_, i| !chosen.contains(&i))
             })
             .collect(),
+        Protocol::TrainQuery { queries } => {
+            let trained = classes.len().saturating_sub(queries);
+            vec![split(&|_, i| i >= trained)]
+        }
         Protocol::KFold { folds, seed } => {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let mut fold_of = vec![0; classes.len()];
@@ -173,6 +183,14 @@ mod tests {
         );
         assert_eq!(all, rounds(protocol, &CLASSES, &NAMES));
         assert!(all.iter().any(|r| r != &all[0]), "draws differ");
+    }
+
+    #[test]
+    fn the_last_shapes_are_queried_where_their_class_trains() {
+        let all = rounds(Protocol::TrainQuery { queries: 3 }, &CLASSES, &NAMES);
+        assert_eq!(all.len(), 1);
+        assert_eq!(all[0].train["cat"], [2, 1, 0]);
+        assert_eq!(all[0].query, [6, 4], "cat1 and dog1; no shark trains");
     }
 
     #[test]
