@@ -11,20 +11,6 @@ pub(super) struct Point {
     pub normal: [f32; 3],
 }
 
-impl Point {
-    /// Squared distance to another point, and the cosine between the normals.
-    #[inline(always)]
-    pub fn compare(&self, other: &Self) -> (f32, f32) {
-        let (mut distance2, mut facing) = (0.0, 0.0);
-        for k in 0..3 {
-            let d = self.place[k] - other.place[k];
-            distance2 += d * d;
-            facing += self.normal[k] * other.normal[k];
-        }
-        (distance2, facing)
-    }
-}
-
 /// Points in the order of their cells, x fastest.
 pub(super) struct Cells {
     low: [f32; 3],
@@ -32,7 +18,8 @@ pub(super) struct Cells {
     sides: [usize; 3],
     /// Where each cell's points start, and the end of the last.
     start: Vec<u32>,
-    points: Vec<Point>,
+    /// x, y, z of the places and of the normals, each by itself for wide registers.
+    values: [Vec<f32>; 6],
 }
 
 impl Cells {
@@ -57,7 +44,7 @@ impl Cells {
             scale,
             sides,
             start: vec![0; sides.iter().product::<usize>() + 2],
-            points: Vec::new(),
+            values: Default::default(),
         };
         let numbers: Vec<u32> = points.clone().map(|p| cells.number(p.place)).collect();
         for &number in &numbers {
@@ -66,18 +53,21 @@ impl Cells {
         for i in 1..cells.start.len() {
             cells.start[i] += cells.start[i - 1];
         }
-        let empty = Point {
-            place: [0.0; 3],
-            normal: [0.0; 3],
-        };
-        let mut sorted = vec![empty; numbers.len()];
+        cells.values = std::array::from_fn(|_| vec![0.0; numbers.len()]);
         for (point, number) in points.zip(numbers) {
             let slot = &mut cells.start[number as usize + 1];
-            sorted[*slot as usize] = point;
+            for k in 0..3 {
+                cells.values[k][*slot as usize] = point.place[k];
+                cells.values[k + 3][*slot as usize] = point.normal[k];
+            }
             *slot += 1;
         }
-        cells.points = sorted;
         cells
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.values[0].len()
     }
 
     fn along(&self, k: usize, x: f32) -> usize {
@@ -90,9 +80,10 @@ impl Cells {
         ((z * self.sides[1] + y) * self.sides[0] + x) as u32
     }
 
-    /// The points of all cells that a ball touches, and some more, a run of cells at a time.
+    /// The points of all cells that a ball touches, and some more, a run of cells at a time: x, y, z of their places and of
+    /// their normals.
     #[inline(always)]
-    pub fn each_near(&self, place: [f32; 3], radius: f32, mut visit: impl FnMut(&[Point])) {
+    pub fn each_near(&self, place: [f32; 3], radius: f32, mut visit: impl FnMut([&[f32]; 6])) {
         let reach: [(usize, usize); 3] =
             std::array::from_fn(|k| (self.along(k, place[k] - radius), self.along(k, place[k] + radius)));
         for z in reach[2].0..=reach[2].1 {
@@ -101,7 +92,7 @@ impl Cells {
                 let from = self.start[row + reach[0].0] as usize;
                 let to = self.start[row + reach[0].1 + 1] as usize;
                 if from < to {
-                    visit(&self.points[from..to]);
+                    visit(std::array::from_fn(|k| &self.values[k][from..to]));
                 }
             }
         }

@@ -37,7 +37,7 @@ pub struct LocalParameters {
 impl Default for LocalParameters {
     fn default() -> Self {
         Self {
-            radii: vec![0.08, 0.15],
+            radii: vec![0.08],
             keypoints: 1000,
             points: 180,
             smoothing: 0.0,
@@ -106,7 +106,7 @@ fn histograms(
         cancel.check()?;
         let step = parameters.density(parameters.smallest_radius()) / parameters.density(radius);
         let cells = points.cells(step, radius);
-        let mut histogram = Histogram::new(radius);
+        let mut histogram = Histogram::new(radius, &cells);
         for (j, place) in places.iter().enumerate() {
             let column = matrix.col_as_slice_mut(j);
             histogram.fill(&cells, place, &mut column[i * BINS..(i + 1) * BINS]);

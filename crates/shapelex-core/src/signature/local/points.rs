@@ -112,12 +112,18 @@ impl OrientedPoints {
         let reach = (radius * radius) as f32;
         let smoothed = |at: &Point| {
             let mut sum = [0.0f32; 3];
-            cells.each_near(at.place, radius as f32, |points| {
-                for point in points {
-                    let (distance2, facing) = point.compare(at);
+            cells.each_near(at.place, radius as f32, |near| {
+                for (i, x) in near[0].iter().enumerate() {
+                    let place = [*x, near[1][i], near[2][i]];
+                    let normal = [near[3][i], near[4][i], near[5][i]];
+                    let (mut distance2, mut facing) = (0.0, 0.0);
+                    for k in 0..3 {
+                        distance2 += (place[k] - at.place[k]).powi(2);
+                        facing += normal[k] * at.normal[k];
+                    }
                     if facing > 0.0 && distance2 < reach {
                         let share = 1.0 - distance2 / reach;
-                        (0..3).for_each(|k| sum[k] += share * point.normal[k]);
+                        (0..3).for_each(|k| sum[k] += share * normal[k]);
                     }
                 }
             });

@@ -33,6 +33,7 @@ fn mesh((vertices, faces): (Vec<[f64; 3]>, Vec<[u32; 3]>)) -> TriMesh {
 
 fn parameters() -> LocalParameters {
     LocalParameters {
+        radii: vec![0.08, 0.15],
         keypoints: 200,
         ..LocalParameters::default()
     }
