@@ -41,7 +41,6 @@ fn local(c: &mut Criterion) {
     let mesh = surface();
     for keypoints in [1, 1000] {
         let parameters = LocalParameters {
-            radii: vec![0.08, 0.15],
             keypoints,
             ..LocalParameters::default()
         };

@@ -37,7 +37,7 @@ pub struct LocalParameters {
 impl Default for LocalParameters {
     fn default() -> Self {
         Self {
-            radii: vec![0.08],
+            radii: vec![0.06, 0.12],
             keypoints: 1000,
             points: 180,
             smoothing: 0.0,
