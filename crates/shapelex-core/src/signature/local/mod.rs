@@ -39,7 +39,7 @@ impl Default for LocalParameters {
         Self {
             radii: vec![0.06, 0.12],
             keypoints: 1000,
-            points: 180,
+            points: 90,
             smoothing: 0.0,
             seed: 1,
         }

@@ -156,7 +156,7 @@ fn another_triangulation_of_the_surface_gives_nearly_the_same() {
             ..parameters()
         };
         let dense = disagreement(&coarse, mesh, &dense);
-        println!("{usual:.3} with 180 points, {dense:.3} with 1800, {apart:.3} between places");
+        println!("{usual:.3} with 90 points, {dense:.3} with 1800, {apart:.3} between places");
         assert!(usual < bound && usual < 0.5 * apart, "{usual} {apart}");
         assert!(dense < 0.7 * usual, "{dense} {usual}");
     }
