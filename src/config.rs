@@ -4,6 +4,8 @@
 //! spellings: `--query-timeout-seconds`, `SHAPELEX_QUERY_TIMEOUT_SECONDS`, `query_timeout_seconds = 60`. The table in
 //! `docs/configuration.md` is checked against it by a test.
 
+pub use crate::http::config::DEFAULT_LISTEN;
+
 use crate::http::ServiceConfig;
 use crate::model::KeyLimits;
 use crate::store::StoreOptions;
@@ -18,9 +20,6 @@ use std::time::Duration;
 
 /// Where the service and the local commands keep their data, unless told otherwise.
 pub const DEFAULT_DATA: &str = "shapelex-data";
-/// Where the service listens, and where clients look for it, unless told otherwise.
-pub const DEFAULT_LISTEN: SocketAddr =
-    SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 7345);
 
 /// The configuration file or a setting is wrong.
 #[derive(Debug, thiserror::Error)]

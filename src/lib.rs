@@ -9,6 +9,8 @@
 //!
 //! The method itself is `shapelex-core`; `shapelex-eval` measures it.
 
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
 pub mod cli;
 pub mod config;
 pub mod http;

@@ -1,10 +1,11 @@
 //! The calls of the API that commands make.
 
 use super::CliError;
-use super::client::{CallError, Client, Payload};
+use super::client::{Client, Payload};
 use super::encode::encode;
 use super::files::MeshFile;
 use super::follow::{follow, succeeded};
+use super::outcome::CallError;
 use super::parameters::ParameterArgs;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;

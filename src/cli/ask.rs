@@ -1,9 +1,10 @@
 //! A query as the commands send it.
 
 use super::api::mesh_payload;
-use super::client::{CallError, Client, Payload};
+use super::client::{Client, Payload};
 use super::encode::encode;
 use super::files::MeshFile;
+use super::outcome::CallError;
 use crate::http::dto::parameters::QueryRankByName;
 use serde_json::Value;
 use std::fmt::Write;

@@ -3,9 +3,9 @@
 //! Local commands call the very routes a client calls, without a socket in between, so there is one implementation of
 //! uploading, indexing and querying.
 
-use super::outcome::{outcome, unreachable};
+use super::outcome::{CallError, outcome, refusal, unreachable};
 use super::output::note_line;
-use super::wording::{self, Place};
+use super::wording::Place;
 use super::{CliError, data_dir, trust};
 use crate::config::{Config, DEFAULT_LISTEN};
 use crate::http::host::canonical;
@@ -191,45 +191,6 @@ impl Payload {
     }
 }
 
-/// Why a call gave no answer.
-#[derive(Debug, thiserror::Error)]
-pub enum CallError {
-    /// The service refused, and said why.
-    #[error("{detail}")]
-    Refused {
-        /// The stable code of the problem.
-        code: String,
-        /// One sentence.
-        detail: String,
-    },
-    /// No service answered.
-    #[error("{0}")]
-    Unreachable(String),
-}
-
-impl CallError {
-    /// The same, the service's words translated.
-    #[must_use]
-    pub(super) fn worded(self, place: &Place) -> Self {
-        match self {
-            Self::Refused { code, detail } => Self::Refused {
-                detail: wording::detail(place, &code, &detail),
-                code,
-            },
-            other => other,
-        }
-    }
-}
-
-impl From<CallError> for CliError {
-    fn from(error: CallError) -> Self {
-        match error {
-            CallError::Refused { code, detail } => Self::Refused { code, detail },
-            CallError::Unreachable(reason) => Self::Failed(reason),
-        }
-    }
-}
-
 /// A service to talk to.
 pub struct Client(pub(super) Transport);
 
@@ -411,6 +372,34 @@ impl Drop for Client {
                 tracing::warn!(%error, "the last flush failed");
             }
         }
+    }
+}
+
+impl Client {
+    /// Sends a request whose answer is lines of JSON.
+    ///
+    /// # Errors
+    /// As [`Client::call`]; [`CallError::Unreachable`] where a line is no JSON.
+    pub(super) fn lines(&self, method: &str, path: &str, payload: Payload) -> Result<Vec<Value>, CallError> {
+        let (content_type, body) = payload.parts();
+        let (status, bytes) = self.send(method, path, content_type, body)?;
+        if !(200..300).contains(&status) {
+            let refused = outcome(status, &bytes).map(|_| Vec::new());
+            return refused.map_err(|error| error.worded(&self.place()));
+        }
+        bytes
+            .split(|byte| *byte == b'\n')
+            .filter(|line| !line.is_empty())
+            .map(|line| {
+                let cut = |_| CallError::Unreachable("the answer was cut short; ask again".to_owned());
+                serde_json::from_slice(line).map_err(cut)
+            })
+            .collect()
+    }
+
+    /// The refusal that a problem document within an answer stands for.
+    pub(super) fn refusal_of(&self, problem: &Value) -> CallError {
+        refusal(problem, "unknown").worded(&self.place())
     }
 }
 

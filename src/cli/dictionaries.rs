@@ -8,6 +8,7 @@
 
 use super::CliError;
 use super::exported_baselines::{self, Baselines};
+use super::tensors::Tensors;
 use faer::Mat;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
@@ -63,9 +64,6 @@ impl Exported {
         }
     }
 }
-
-/// Name → type, shape and bytes of a tensor.
-pub(super) type Tensors = BTreeMap<String, (Dtype, Vec<usize>, Vec<u8>)>;
 
 /// What a file says about a class.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,6 +1,6 @@
 //! An evaluation as text.
 
-use super::evaluate::{Outcome, Report};
+use super::evaluation::{Outcome, Report};
 use super::output::table;
 use shapelex_eval::benchmark::retrieval::RetrievalOutcome;
 use shapelex_eval::benchmark::{AtLevel, Estimate, OpenSet, Share};

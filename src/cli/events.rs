@@ -1,6 +1,7 @@
 //! Server-sent events of a service, as they come.
 
-use super::client::{CallError, Client, Transport};
+use super::client::{Client, Transport};
+use super::outcome::CallError;
 use super::outcome::outcome;
 use super::transfer::{authorized, unreachable};
 use axum::body::Body;

@@ -4,7 +4,7 @@
 //! in the order of the names in the metadata: `<class>/shape_dna` (f64, eigenvalues; rows are filled up with NaN),
 //! `<class>/signature_distances` and `<class>/bag_of_words` (f32, histograms).
 
-use super::dictionaries::Tensors;
+use super::tensors::Tensors;
 use faer::Mat;
 use safetensors::tensor::{Dtype, SafeTensors};
 use serde::{Deserialize, Serialize};

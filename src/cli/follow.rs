@@ -1,8 +1,9 @@
 //! A job, followed to its end.
 
 use super::CliError;
-use super::client::{CallError, Client, Payload};
+use super::client::{Client, Payload};
 use super::encode::encode;
+use super::outcome::CallError;
 use super::progress::Progress;
 use serde_json::Value;
 use std::ops::ControlFlow;

@@ -1,9 +1,10 @@
 //! `shapelex index`: a folder per class → a learnt index.
 
-use super::client::{CallError, Client, TargetArgs};
+use super::client::{Client, TargetArgs};
 use super::confirm::ConfirmArgs;
 use super::files::MeshFile;
 use super::folders::{LabelledFile, labelled_files};
+use super::outcome::CallError;
 use super::progress::Progress;
 use super::refused::Refused;
 use super::values::at_least_one;

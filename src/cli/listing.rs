@@ -1,7 +1,8 @@
 //! Lists of a service, page by page, and single objects as lines.
 
-use super::client::{CallError, Client, Payload};
+use super::client::{Client, Payload};
 use super::encode::encode;
+use super::outcome::CallError;
 use super::{CliError, output};
 use serde_json::Value;
 

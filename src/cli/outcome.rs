@@ -1,7 +1,47 @@
 //! What a service answered, as JSON or as the reason why there is none.
 
-use super::client::{CallError, Client, Payload};
+use super::CliError;
+use super::wording::{self, Place};
 use serde_json::Value;
+
+/// Why a call gave no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum CallError {
+    /// The service refused, and said why.
+    #[error("{detail}")]
+    Refused {
+        /// The stable code of the problem.
+        code: String,
+        /// One sentence.
+        detail: String,
+    },
+    /// No service answered.
+    #[error("{0}")]
+    Unreachable(String),
+}
+
+impl CallError {
+    /// The same, the service's words translated.
+    #[must_use]
+    pub(super) fn worded(self, place: &Place) -> Self {
+        match self {
+            Self::Refused { code, detail } => Self::Refused {
+                detail: wording::detail(place, &code, &detail),
+                code,
+            },
+            other => other,
+        }
+    }
+}
+
+impl From<CallError> for CliError {
+    fn from(error: CallError) -> Self {
+        match error {
+            CallError::Refused { code, detail } => Self::Refused { code, detail },
+            CallError::Unreachable(reason) => Self::Failed(reason),
+        }
+    }
+}
 
 /// An answer's JSON, or why there is none.
 pub(super) fn outcome(status: u16, bytes: &[u8]) -> Result<Value, CallError> {
@@ -13,7 +53,7 @@ pub(super) fn outcome(status: u16, bytes: &[u8]) -> Result<Value, CallError> {
 }
 
 /// What a problem document says.
-fn refusal(problem: &Value, status: &str) -> CallError {
+pub(super) fn refusal(problem: &Value, status: &str) -> CallError {
     let text = |name: &str| problem.get(name).and_then(Value::as_str).map(str::to_owned);
     CallError::Refused {
         code: text("code").unwrap_or_else(|| status.to_owned()),
@@ -40,32 +80,4 @@ pub(super) fn unreachable(base: &str, error: &ureq::Error) -> CallError {
         ""
     };
     CallError::Unreachable(format!("{text}{hint}"))
-}
-
-impl Client {
-    /// Sends a request whose answer is lines of JSON.
-    ///
-    /// # Errors
-    /// As [`Client::call`]; [`CallError::Unreachable`] where a line is no JSON.
-    pub(super) fn lines(&self, method: &str, path: &str, payload: Payload) -> Result<Vec<Value>, CallError> {
-        let (content_type, body) = payload.parts();
-        let (status, bytes) = self.send(method, path, content_type, body)?;
-        if !(200..300).contains(&status) {
-            let refused = outcome(status, &bytes).map(|_| Vec::new());
-            return refused.map_err(|error| error.worded(&self.place()));
-        }
-        bytes
-            .split(|byte| *byte == b'\n')
-            .filter(|line| !line.is_empty())
-            .map(|line| {
-                let cut = |_| CallError::Unreachable("the answer was cut short; ask again".to_owned());
-                serde_json::from_slice(line).map_err(cut)
-            })
-            .collect()
-    }
-
-    /// The refusal that a problem document within an answer stands for.
-    pub(super) fn refusal_of(&self, problem: &Value) -> CallError {
-        refusal(problem, "unknown").worded(&self.place())
-    }
 }

@@ -1,8 +1,9 @@
 //! `shapelex query`: which class a mesh belongs to.
 
 use super::ask::Question;
-use super::client::{CallError, Client, TargetArgs};
+use super::client::{Client, TargetArgs};
 use super::files::MeshFile;
+use super::outcome::CallError;
 use super::progress::Progress;
 use super::query_inputs::{Input, Place, gather};
 use super::query_summary::Summary;

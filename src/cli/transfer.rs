@@ -1,7 +1,8 @@
 //! Files too large for memory, sent to a service and fetched from it piece by piece.
 
 use super::CliError;
-use super::client::{CallError, Client, Transport};
+use super::client::{Client, Transport};
+use super::outcome::CallError;
 use super::outcome::outcome;
 use axum::body::Body;
 use axum::http::Request;

@@ -10,6 +10,11 @@ fn file(text: &str) -> tempfile::NamedTempFile {
 }
 
 #[test]
+fn an_embedder_gets_the_defaults_of_the_command_line() {
+    assert_eq!(Config::default().service(), ServiceConfig::default());
+}
+
+#[test]
 fn flags_win_over_the_file_and_the_file_over_defaults() {
     let file = file("listen = \"0.0.0.0:80\"\njob_queue = 7\nlog_format = \"json\"\n");
     let flags = Settings {

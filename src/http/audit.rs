@@ -1,7 +1,7 @@
 //! The audit log: who changed what, when, and how it ended. One JSON object per line in `audit.log` of the data
 //! directory; no secret is ever in it.
 
-use super::auth::Caller;
+use super::caller::Caller;
 use jiff::Timestamp;
 use serde::Serialize;
 use std::fs::{File, OpenOptions};

@@ -1,41 +1,17 @@
 //! Who asks, and whether they may: API keys and their scopes.
 
 use super::access::Access;
+use super::caller::Caller;
 use super::config::ServiceConfig;
 use super::problem::{Code, Problem};
 use super::state::Parts;
 use crate::model::ApiKey;
-use axum::extract::FromRequestParts;
-use axum::http::request::Parts as RequestParts;
 use axum::http::{HeaderMap, HeaderName, header};
 use jiff::Timestamp;
-use std::convert::Infallible;
 use std::sync::Arc;
 
 /// The other header a key may come in.
 pub const API_KEY: HeaderName = HeaderName::from_static("x-api-key");
-
-/// Who asks: a key, or nobody in particular where keys are off. Among the extensions of every request.
-#[derive(Clone, Debug, Default)]
-pub struct Caller {
-    /// The key.
-    pub key: Option<Arc<ApiKey>>,
-}
-
-impl Caller {
-    /// The key's name, or `anonymous`.
-    pub fn name(&self) -> &str {
-        self.key.as_ref().map_or("anonymous", |key| key.name.as_str())
-    }
-}
-
-impl<S: Send + Sync> FromRequestParts<S> for Caller {
-    type Rejection = Infallible;
-
-    async fn from_request_parts(parts: &mut RequestParts, _: &S) -> Result<Self, Infallible> {
-        Ok(parts.extensions.get::<Self>().cloned().unwrap_or_default())
-    }
-}
 
 /// Whether requests need a key: there is one, there was one since the start, or the address is not loopback and
 /// nobody allowed anonymous callers.

@@ -7,9 +7,12 @@ use crate::model::KeyLimits;
 use crate::store::StoreOptions;
 use shapelex_core::mesh::Limits;
 use shapelex_core::parameters::Preset;
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::time::Duration;
+
+/// Where the service listens, and where clients look for it, unless told otherwise.
+pub const DEFAULT_LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 7345);
 
 /// What an upload may hold at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,13 +101,13 @@ pub struct ServiceConfig {
 }
 
 impl Default for ServiceConfig {
-    /// Loopback port 7878, `./shapelex-data`, bodies up to 128 MiB, 2048 files or 256 MiB unpacked per upload, a query
+    /// [`DEFAULT_LISTEN`], `./shapelex-data`, bodies up to 128 MiB, 2048 files or 256 MiB unpacked per upload, a query
     /// thread per core, 64 waiting queries for at most 10 s each, 60 s per query, 120 s per body.
     fn default() -> Self {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let jobs = JobOptions::default();
         Self {
-            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 7878)),
+            listen: DEFAULT_LISTEN,
             hosts: Vec::new(),
             allow_anonymous: false,
             check_keys: true,

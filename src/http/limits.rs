@@ -3,7 +3,7 @@
 //! What a key does not say itself the service's settings say; without either there is no limit. Callers without a key
 //! have none: they are told apart by nothing.
 
-use super::auth::Caller;
+use super::caller::Caller;
 use super::problem::{Code, Problem};
 use crate::model::{KeyId, KeyLimits};
 use crate::store::{self, Maker, Store, StoreError};

@@ -13,6 +13,7 @@ pub mod audit;
 pub mod auth;
 mod batch;
 mod body;
+pub mod caller;
 mod checked;
 mod compression;
 pub mod config;

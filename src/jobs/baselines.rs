@@ -1,8 +1,8 @@
 //! What the baselines need of an index: learnt with it, kept with its generation.
 
+use super::context::{Reindex, stop_if_cancelled};
 use super::describe::Describer;
 use super::failure::{MEMORY_EXCEEDED, ReindexError, no_memory};
-use super::reindex::{Reindex, stop_if_cancelled};
 use crate::model::{Generation, GenerationClass, Origin, Shape};
 use crate::store::{Store, StoreError};
 use shapelex_core::baseline::{BaselineModel, thinned};

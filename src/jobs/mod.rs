@@ -5,6 +5,7 @@
 
 mod baselines;
 mod behind;
+mod context;
 mod describe;
 pub mod error;
 mod exclusive;

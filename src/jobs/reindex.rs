@@ -1,37 +1,23 @@
 //! Learning the index: describe the shapes, learn the classes, switch.
 
 use super::baselines::learn_baselines;
+use super::context::{Reindex, stop_if_cancelled};
 use super::describe::{Described, Describer, Failure};
 use super::failure::{MEMORY_EXCEEDED, ReindexError, code, no_memory};
 use super::live::{Publisher, of_generation};
 use super::plan::{Plan, ToLearn, plan, shape_key, skipped};
-use super::progress::Progress;
-use super::share::{Share, index_bytes};
+use super::share::index_bytes;
 use super::trim;
 use crate::model::{
-    FailedShape, Generation, GenerationClass, GenerationShape, Origin, ReindexReport, ReindexScope,
-    RelearnedClass, Shape, SkippedClass,
+    FailedShape, Generation, GenerationClass, GenerationShape, Origin, ReindexReport, RelearnedClass, Shape,
+    SkippedClass,
 };
-use crate::store::{Store, StoreError};
+use crate::store::StoreError;
 use jiff::Timestamp;
-use shapelex_core::cancel::Cancel;
 use shapelex_core::memory::MemoryError;
-use shapelex_core::mesh::Limits;
 use shapelex_core::parameters::Parameters;
 use shapelex_core::pipeline::estimate;
 use shapelex_core::pipeline::{Description, PipelineError, held_out_scores, learn_model};
-
-/// What is asked, and with what.
-pub(super) struct Reindex<'a> {
-    pub(super) store: &'a Store,
-    pub(super) limits: &'a Limits,
-    /// The memory for reindexing, the index that is served included.
-    pub(super) share: Share,
-    pub(super) cancel: &'a Cancel,
-    pub(super) progress: &'a Progress,
-    pub(super) scope: &'a ReindexScope,
-    pub(super) parameters: Option<&'a Parameters>,
-}
 
 /// What came of it.
 pub(super) struct Outcome {
@@ -85,10 +71,6 @@ pub(super) fn reindex(request: &Reindex<'_>, live: &Publisher) -> Result<Outcome
     let generation = switch(request, current, parameters, classes, baselines, live)?;
     request.progress.advance();
     Ok(Outcome { generation, report })
-}
-
-pub(super) fn stop_if_cancelled(request: &Reindex<'_>) -> Result<(), ReindexError> {
-    request.cancel.check().map_err(|_| ReindexError::Cancelled)
 }
 
 /// Describes and learns what the plan asks for; adds to the classes of the generation and to the report.

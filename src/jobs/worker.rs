@@ -1,8 +1,9 @@
 //! The worker thread: takes jobs in order, one at a time, and brings each to an end.
 
+use super::context::Reindex;
 use super::failure::{ReindexError, panic_text};
 use super::progress::Progress;
-use super::reindex::{Outcome, Reindex, reindex};
+use super::reindex::{Outcome, reindex};
 use super::share::Share;
 use super::{Inner, JobError, Running};
 use crate::model::{Job, JobFailure, JobId, JobKind, JobState};

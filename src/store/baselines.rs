@@ -3,7 +3,7 @@
 //! The model's key is the hash of its contents, a class's that of its dictionaries with the model's: equal keys mean
 //! equal contents, so an unchanged class is not written again.
 
-use super::event::{get, put};
+use super::entry::{get, put};
 use super::payload::{only, pack, unpack};
 use super::record::{Family, Record};
 use super::{Batch, Store, StoreError, keys};

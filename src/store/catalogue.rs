@@ -1,6 +1,7 @@
 //! Classes and their shapes.
 
-use super::event::{Event, files_of, get, shapes_of};
+use super::entry::get;
+use super::event::{Event, files_of, shapes_of};
 use super::payload::{IdentityLink, NameLink, OwnerLink};
 use super::{Batch, Maker, Statistics, Store, StoreError, Writer, keys, record};
 use crate::model::{Class, ClassId, ClassName, CompanionFile, ContentHash, NewShape, Shape, ShapeId};

@@ -1,6 +1,6 @@
 //! Why the store could not do what it was asked.
 
-use super::usage::Quota;
+use super::quota::Quota;
 use crate::model::{ClassId, ClassName, ContentHash, JobId, KeyId, KeyName, ShapeId, SnapshotId};
 use std::fmt;
 use std::path::PathBuf;

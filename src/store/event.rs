@@ -3,8 +3,9 @@
 //! gives the records back.
 
 use super::backend::{Backend, Batch};
+use super::entry::{get, put};
 use super::payload::{IdentityLink, NameLink, Number, OwnerLink, ReferenceLink};
-use super::record::{Record, seal, unseal};
+use super::record::unseal;
 use super::usage::{note_class, note_shape};
 use super::{StoreError, keys};
 use crate::model::{ApiKey, Class, ClassId, ClassName, ContentHash, KeyId, Shape, ShapeId};
@@ -73,16 +74,6 @@ pub enum Event {
     KeyRevoked { id: KeyId },
     /// Several changes at once, each of another class: all of them happened.
     Several { events: Vec<Event> },
-}
-
-pub(super) fn get<R: Record>(backend: &dyn Backend, key: &[u8]) -> Result<Option<R>, StoreError> {
-    backend.get(key)?.map(|bytes| unseal(key, &bytes)).transpose()
-}
-
-pub(super) fn put<R: Record>(batch: &mut Batch, key: Vec<u8>, record: &R) -> Result<(), StoreError> {
-    let bytes = seal(&key, record)?;
-    batch.put(key, bytes);
-    Ok(())
 }
 
 /// All shapes of a class, by identifier.

@@ -1,6 +1,7 @@
 //! Generations of the index: written beside each other, switched by one atomic write.
 
-use super::event::{Event, get, put};
+use super::entry::{get, put};
+use super::event::Event;
 use super::payload::Number;
 use super::{Batch, Store, StoreError, keys};
 use crate::model::Generation;

@@ -1,6 +1,6 @@
 //! Which job an `Idempotency-Key` started, so that asking again starts no second one.
 
-use super::event::{get, put};
+use super::entry::{get, put};
 use super::payload::{instant, only, pack, unpack};
 use super::record::{Family, Record};
 use super::{Store, StoreError, keys, record};

@@ -1,6 +1,6 @@
 //! Jobs, and which of them are not finished.
 
-use super::event::{get, put};
+use super::entry::{get, put};
 use super::payload::QueueLink;
 use super::{Batch, Store, StoreError, keys, record};
 use crate::model::{Job, JobId};

@@ -2,7 +2,7 @@
 //! directory.
 
 use super::backend::{Backend, Batch};
-use super::event::{get, put};
+use super::entry::{get, put};
 use super::payload::Number;
 use super::record::seal;
 use super::{StoreError, files, keys, payload};

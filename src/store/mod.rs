@@ -17,6 +17,7 @@ mod catalogue_log;
 mod damage;
 mod dataset;
 mod dictionaries;
+mod entry;
 pub mod error;
 mod event;
 mod failure;
@@ -39,6 +40,7 @@ pub mod page;
 mod payload;
 mod payload_jobs;
 mod private;
+mod quota;
 mod rebuild;
 pub mod record;
 mod records;
@@ -63,8 +65,9 @@ pub use idempotency::Remembered;
 pub use memory_backend::MemoryBackend;
 pub use migrate::FORMAT;
 pub use originals::CheckedFile;
+pub use quota::Quota;
 pub use scrub::ScrubReport;
-pub use usage::{Maker, Quota, Usage};
+pub use usage::{Maker, Usage};
 
 use backend::Batch;
 use catalogue_log::CatalogueLog;
@@ -185,7 +188,7 @@ impl Inner {
         // Staged before the log knows of it: a record that cannot be read must not leave an event behind.
         let mut batch = event::stage(&*self.backend, event)?;
         batch.writes.extend(more.writes);
-        event::put(&mut batch, keys::META_SEQUENCE.to_vec(), &Number(sequence))?;
+        entry::put(&mut batch, keys::META_SEQUENCE.to_vec(), &Number(sequence))?;
         let length = writer.log.length();
         if let Err(append) = writer.log.append(sequence, event) {
             return Err(if append.in_doubt {

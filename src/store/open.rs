@@ -2,7 +2,8 @@
 
 use super::backend::{Backend, Batch};
 use super::catalogue_log::{self, CatalogueLog};
-use super::event::{Event, get, put, shapes_of};
+use super::entry::{get, put};
+use super::event::{Event, shapes_of};
 use super::failure::{Failure, require_space};
 use super::layout::{LOG, has_originals, has_records, is_empty};
 use super::migrate::Format;

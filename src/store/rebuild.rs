@@ -4,7 +4,8 @@
 //! `sled`, which becomes `sled.damaged-<time>`. Killed at any point, the next start goes on from there.
 
 use super::backend::{Backend, Batch, Entry};
-use super::event::{files_of, get};
+use super::entry::get;
+use super::event::files_of;
 use super::failure::Failure;
 use super::layout::{LOG, REBUILT, RECORDS, has_originals, is_empty};
 use super::payload::Number;

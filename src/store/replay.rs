@@ -2,7 +2,8 @@
 
 use super::backend::Backend;
 use super::catalogue_log::{self, LogScan};
-use super::event::{self, get, put};
+use super::entry::{get, put};
+use super::event;
 use super::payload::Number;
 use super::{StoreError, keys};
 use std::path::Path;

@@ -8,7 +8,7 @@
 use super::backend::{Backend, Batch, Entry};
 use super::ordered_map::OrderedMap;
 use super::payload::Number;
-use super::{StoreError, catalogue_log, event, keys};
+use super::{StoreError, catalogue_log, entry, event, keys};
 use std::path::Path;
 use std::sync::{PoisonError, RwLock};
 
@@ -55,7 +55,7 @@ impl Standby {
         })?;
         let mut batch = Batch::default();
         let sequence = Number(scan.last.min(last));
-        event::put(&mut batch, keys::META_SEQUENCE.to_vec(), &sequence)?;
+        entry::put(&mut batch, keys::META_SEQUENCE.to_vec(), &sequence)?;
         standby
             .map
             .write()

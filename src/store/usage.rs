@@ -4,11 +4,11 @@
 //! about, and removed when a count finds that gone. The catalogue log names the key too, so a change that is replayed
 //! counts as well.
 
-use super::event::{get, put};
+use super::entry::{get, put};
 use super::payload::{Number, OwnerLink};
+use super::quota::Quota;
 use super::{Batch, Store, StoreError, Writer, keys, record};
 use crate::model::{ClassId, KeyId, KeyLimits, Shape, ShapeId};
-use std::fmt;
 
 /// How much of the catalogue was made with an API key.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,34 +28,6 @@ pub struct Maker {
     pub key: KeyId,
     /// Its limits; what is `None` has none.
     pub limits: KeyLimits,
-}
-
-/// What an API key may have a limited amount of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quota {
-    /// Classes.
-    Classes,
-    /// Bytes of the shapes' files.
-    StoredBytes,
-}
-
-impl Quota {
-    /// Its name on the wire.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Classes => "classes",
-            Self::StoredBytes => "stored_bytes",
-        }
-    }
-}
-
-impl fmt::Display for Quota {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Classes => "classes",
-            Self::StoredBytes => "bytes of shapes",
-        })
-    }
 }
 
 /// Notes that a class was made with a key.

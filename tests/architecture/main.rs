@@ -1,5 +1,6 @@
 //! The house's rules, as tests: who may use whom, and how long a file may be.
 
+mod circles;
 mod documents;
 
 use std::collections::BTreeSet;

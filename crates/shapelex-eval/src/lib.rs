@@ -5,6 +5,8 @@
 //!
 //! Data flows one way: `sample → benchmark → figure`.
 
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
 pub mod benchmark;
 pub mod figure;
 pub mod sample;

@@ -9,7 +9,7 @@ use axum::extract::{Request, State};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-/// Refuses the request, or runs it with its [`Caller`](crate::http::auth::Caller) among its extensions.
+/// Refuses the request, or runs it with its [`Caller`](crate::http::caller::Caller) among its extensions.
 pub async fn admit(State(state): State<AppState>, mut request: Request, next: Next) -> Response {
     let access = Matched::of(&request).access();
     let (caller, authorized) = authorize(&state, request.headers(), access);

@@ -2,7 +2,7 @@
 //! [`record`], [`problems`], [`admit`], [`memory`], [`methods`].
 //!
 //! What one layer finds out, others read off the request's or the response's extensions: [`RequestId`],
-//! [`Matched`](super::operation::Matched) and [`Caller`](super::auth::Caller) on the request, `Caller` and
+//! [`Matched`](super::operation::Matched) and [`Caller`](super::caller::Caller) on the request, `Caller` and
 //! [`Outcome`](problems::Outcome) on the response.
 
 mod admit;

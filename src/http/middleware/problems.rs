@@ -2,7 +2,7 @@
 
 use super::identify::RequestId;
 use crate::http::admission::panic_message;
-use crate::http::auth::Caller;
+use crate::http::caller::Caller;
 use crate::http::metrics;
 use crate::http::problem::{Code, Problem};
 use axum::extract::Request;

@@ -3,7 +3,7 @@
 use super::identify::RequestId;
 use super::problems::Outcome;
 use crate::http::audit::{Entry, Request as Audited};
-use crate::http::auth::Caller;
+use crate::http::caller::Caller;
 use crate::http::metrics;
 use crate::http::operation::Matched;
 use crate::http::state::AppState;

@@ -2,7 +2,7 @@
 
 use crate::http::AppState;
 use crate::http::access::Access;
-use crate::http::auth::Caller;
+use crate::http::caller::Caller;
 use crate::http::dto::class::{ClassDto, CreateClass, RenameClass};
 use crate::http::dto::{Page, PageQuery};
 use crate::http::extract::{ApiJson, ApiPath, ApiQuery};

@@ -2,7 +2,7 @@
 
 use crate::http::AppState;
 use crate::http::access::Access;
-use crate::http::auth::Caller;
+use crate::http::caller::Caller;
 use crate::http::checked::{self, rejected};
 use crate::http::dataset::{Placed, class_name, places};
 use crate::http::dto::Binary;

@@ -3,7 +3,7 @@
 use super::classes::{find_class, insert};
 use crate::http::AppState;
 use crate::http::access::Access;
-use crate::http::auth::Caller;
+use crate::http::caller::Caller;
 use crate::http::dto::job::{JobDto, JobEvent, ScopeDto, StartReindex};
 use crate::http::dto::{Page, PageQuery};
 use crate::http::extract::{ApiPath, ApiQuery, OptionalJson};

@@ -3,7 +3,7 @@
 use super::classes::insert;
 use crate::http::AppState;
 use crate::http::access::Access;
-use crate::http::auth::Caller;
+use crate::http::caller::Caller;
 use crate::http::dto::key::{CreateKey, CreatedKey, KeyDto};
 use crate::http::dto::{Page, PageQuery};
 use crate::http::extract::{ApiJson, ApiPath, ApiQuery};

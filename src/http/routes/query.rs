@@ -3,8 +3,8 @@
 use crate::http::AppState;
 use crate::http::access::Access;
 use crate::http::admission::Patience;
-use crate::http::auth::Caller;
 use crate::http::batch::Batch;
+use crate::http::caller::Caller;
 use crate::http::dto::query::{BatchLine, QueryAnswer, QueryOptions};
 use crate::http::dto::{Binary, FilesForm};
 use crate::http::extract::ApiQuery;

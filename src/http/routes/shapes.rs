@@ -3,7 +3,7 @@
 use super::classes::{find_class, insert, is_at_hand};
 use crate::http::AppState;
 use crate::http::access::Access;
-use crate::http::auth::Caller;
+use crate::http::caller::Caller;
 use crate::http::dto::class::ClassDto;
 use crate::http::dto::shape::{ShapeDto, UploadQuery, UploadResult};
 use crate::http::dto::{Binary, FilesForm, Page, PageQuery};

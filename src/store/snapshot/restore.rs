@@ -1,7 +1,8 @@
 //! Bringing a snapshot back: unpacked and checked beside the state in use, then switched to.
 
 use super::super::backend::{Backend, Batch};
-use super::super::event::{files_of, get, put};
+use super::super::entry::{get, put};
+use super::super::event::files_of;
 use super::super::files;
 use super::super::open::settle;
 use super::super::payload::Number;

@@ -1,6 +1,6 @@
 //! Making a snapshot.
 
-use super::super::event::get;
+use super::super::entry::get;
 use super::super::layout::ORIGINALS;
 use super::super::payload::Number;
 use super::super::{Store, StoreError, files, keys, migrate};

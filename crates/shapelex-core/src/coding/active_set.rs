@@ -9,38 +9,13 @@
 
 use super::cholesky::Factor;
 use super::dot::dot;
-use super::lasso::column;
-use super::path::{Arrival, Path};
-use super::scan::{Lanes, Rows, largest_magnitude, pieces, place_of, residual_gradient, step_along};
-use faer::MatRef;
+use super::homotopy::{Homotopy, Outcome};
+use super::problem::{Problem, column};
+use super::rows::{Lanes, pieces};
+use super::scan::{largest_magnitude, place_of, residual_gradient, step_along};
 
 /// Atoms added per look at the gradient: more saves looks, fewer saves atoms that must leave again.
 const ADDED_AT_ONCE: usize = 4;
-
-/// One Lasso. Correlations and Gram matrix at single precision find the atoms that matter, and exact ones decide.
-#[derive(Clone, Copy)]
-pub(super) struct Problem<'a> {
-    /// D, M × L, columns contiguous.
-    pub atoms: MatRef<'a, f64>,
-    /// ‖d_j‖² of each atom.
-    pub squares: &'a [f64],
-    /// DᵀD, L × L, columns contiguous, where it is known.
-    pub gram: Option<MatRef<'a, f64>>,
-    /// DᵀD at single precision.
-    pub rough_gram: &'a Rows,
-    /// Bound on the error of its entries beyond their own rounding.
-    pub rough_gram_error: f64,
-    /// s, M values.
-    pub signal: &'a [f64],
-    /// ‖s‖.
-    pub norm: f64,
-    /// Dᵀs to within `error`, L values.
-    pub rough_correlation: &'a [Lanes],
-    pub error: f64,
-    pub lambda: f64,
-    /// How far |d_jᵀ(s − Da)| may exceed λ.
-    pub tolerance: f64,
-}
 
 /// The active set of the signal at hand.
 #[derive(Clone, Debug, Default)]
@@ -51,14 +26,10 @@ pub(super) struct ActiveSet {
     pub values: Vec<f64>,
     signs: Vec<f64>,
     factor: Factor,
-    /// The search starts with what the path along which the code is sought first has come to.
-    pub path: Path,
+    /// The search starts with what the homotopy ends with.
+    pub homotopy: Homotopy,
     /// The gradient at the code last looked at.
-    pub gradient: Vec<Lanes>,
-    /// The gradient at the level that the path has reached.
-    pub here: Vec<Lanes>,
-    /// Where on the rest of the path each |q_j| meets the level.
-    pub crossings: Vec<Lanes>,
+    gradient: Vec<Lanes>,
     /// Whether correlations are taken at full precision; the search begins with the rough ones.
     exact: bool,
     /// max |q_j| over the atoms outside the set, at the last look.
@@ -79,34 +50,13 @@ pub(super) struct ActiveSet {
     refused: Vec<usize>,
 }
 
-impl Problem<'_> {
-    /// d_iᵀd_j.
-    #[inline(always)]
-    pub fn product(&self, i: usize, j: usize) -> f64 {
-        match self.gram {
-            Some(gram) => column(gram, j)[i],
-            None => dot(column(self.atoms, i), column(self.atoms, j)),
-        }
-    }
-
-    /// How far the gradient at single precision may be off under a code of so many non-zeros with so large a ‖a‖₁.
-    #[inline(always)]
-    pub fn gradient_error(&self, nonzeros: usize, norm1: f64) -> f64 {
-        let terms = (nonzeros + 1) as f64;
-        self.error
-            + 4.0 * f64::from(f32::EPSILON) * terms.sqrt() * (self.norm + norm1)
-            + self.rough_gram_error * norm1
-    }
-}
-
 impl ActiveSet {
     /// Empties the set, for a dictionary of `atoms` atoms.
     pub fn reset(&mut self, atoms: usize) {
         self.empty();
         self.refused.clear();
-        for row in [&mut self.gradient, &mut self.here, &mut self.crossings] {
-            row.resize(pieces(atoms), Lanes::default());
-        }
+        self.homotopy.reset(atoms);
+        self.gradient.resize(pieces(atoms), Lanes::default());
         self.correlation.resize(atoms, 0.0);
         self.known.resize(atoms, 0);
     }
@@ -121,15 +71,17 @@ impl ActiveSet {
         self.forward.clear();
     }
 
-    /// Solves `problem` from nothing. True where `path` has the solution; otherwise the set is one to go on from.
+    /// Solves `problem` from nothing. True where the homotopy's path has the solution; otherwise the set is one to go on
+    /// from.
     #[inline(always)]
-    pub fn solve_by_path(&mut self, problem: &Problem<'_>) -> bool {
-        if self.trace(problem) == Arrival::Solved {
+    pub fn solve_by_homotopy(&mut self, problem: &Problem<'_>) -> bool {
+        if self.homotopy.follow(problem) == Outcome::Solved {
             return true;
         }
         self.empty();
-        for k in 0..self.path.count {
-            let (j, value, sign) = (self.path.atoms[k], self.path.values[k], self.path.signs[k]);
+        for k in 0..self.homotopy.path.count {
+            let path = &self.homotopy.path;
+            let (j, value, sign) = (path.atoms[k], path.values[k], path.signs[k]);
             if !self.append(problem, j, value, sign) {
                 break;
             }

@@ -1,5 +1,7 @@
 //! A Cholesky factor that grows and shrinks by one row: the Gram matrix of an active set.
 
+use super::packed::start;
+
 /// The smallest pivot, relative to the new atom's squared norm, with which an atom still counts as independent of
 /// the set. Rounding leaves about 1e-14 where an atom is an exact combination of the others.
 const DEPENDENT: f64 = 1e-12;
@@ -37,11 +39,6 @@ fn short_dot(x: &[f64], y: &[f64]) -> f64 {
         }
     }
     sums[0] + tail
-}
-
-#[inline(always)]
-pub(super) fn start(row: usize) -> usize {
-    row * (row + 1) / 2
 }
 
 impl Factor {

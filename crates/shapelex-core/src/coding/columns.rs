@@ -1,7 +1,7 @@
 //! The columns of several matrices, numbered through, as if they stood side by side.
 
 use super::CodingError;
-use super::lasso::column;
+use super::problem::column;
 use faer::{Mat, MatRef};
 
 /// N columns of M values in however many matrices.

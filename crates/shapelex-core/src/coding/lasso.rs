@@ -1,36 +1,10 @@
 //! The Lasso of every signal against one dictionary (docs/method.md#coding; Eq. 1).
 
+use super::encoder::with_kept;
 use super::prepared::Prepared;
-use super::workspace::with_kept;
-use super::{CodingError, Dictionary, Signals};
+use super::{CodeScore, Codes, CodingError, Dictionary, Signals};
 use crate::cancel::Cancel;
 use faer::MatRef;
-
-/// Sparse codes of N signals under one dictionary of L atoms, and what they cost.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Codes {
-    /// N + 1 offsets into `atoms` and `values`: the code of signal i is `offsets[i]..offsets[i + 1]`.
-    pub offsets: Vec<usize>,
-    /// Atom of each non-zero, ascending within a signal.
-    pub atoms: Vec<u32>,
-    /// Value of each non-zero.
-    pub values: Vec<f64>,
-    /// N values ½‖s − Da‖² + λ‖a‖₁.
-    pub objective: Vec<f64>,
-    /// N values ‖s − Da‖².
-    pub residual2: Vec<f64>,
-}
-
-/// What coding one signal cost, without the code itself.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CodeScore {
-    /// ½‖s − Da‖² + λ‖a‖₁.
-    pub objective: f64,
-    /// ‖s − Da‖².
-    pub residual2: f64,
-    /// Non-zeros of a.
-    pub nonzeros: usize,
-}
 
 /// Codes every column of `signals` (M × N): argmin_a ½‖s − D a‖² + λ‖a‖₁.
 ///
@@ -70,9 +44,9 @@ pub(super) fn encode_prepared(
     lambda: f64,
     cancel: &Cancel,
 ) -> Result<Codes, CodingError> {
-    with_kept(|workspace| {
-        workspace.run(dictionary, signals, lambda, cancel)?;
-        Ok(workspace.codes())
+    with_kept(|encoder| {
+        encoder.run(dictionary, signals, lambda, cancel)?;
+        Ok(encoder.codes())
     })
 }
 
@@ -94,9 +68,9 @@ pub(super) fn score_prepared(
     lambda: f64,
     cancel: &Cancel,
 ) -> Result<Vec<CodeScore>, CodingError> {
-    with_kept(|workspace| {
-        workspace.run(dictionary, signals, lambda, cancel)?;
-        Ok(workspace.scores())
+    with_kept(|encoder| {
+        encoder.run(dictionary, signals, lambda, cancel)?;
+        Ok(encoder.scores())
     })
 }
 
@@ -120,14 +94,4 @@ pub(super) fn check_lambda(lambda: f64) -> Result<(), CodingError> {
         expected: "positive and finite",
         found: format!("{lambda}"),
     })
-}
-
-/// Column `j` of a column-major matrix.
-#[inline(always)]
-pub(super) fn column<T>(matrix: MatRef<'_, T>, j: usize) -> &[T] {
-    // Callers make sure of the layout; an empty slice would be met by the checks of dimensions in front.
-    matrix
-        .col(j)
-        .try_as_col_major()
-        .map_or(&[], |column| column.as_slice())
 }

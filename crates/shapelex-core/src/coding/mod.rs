@@ -2,18 +2,24 @@
 
 mod active_set;
 mod cholesky;
+pub mod codes;
 mod columns;
+mod coordinate_descent;
 pub mod dictionary;
 mod dictionary_update;
 mod dispatch;
 mod dot;
+mod encoder;
 pub mod error;
+mod homotopy;
 mod initialise;
-pub mod kkt;
 pub mod lasso;
 pub mod learn;
-mod path;
+pub mod optimality;
+mod packed;
 mod prepared;
+mod problem;
+mod rows;
 mod scan;
 mod screen;
 pub mod signals;
@@ -21,11 +27,11 @@ pub mod signals;
 mod wide;
 #[cfg(target_arch = "x86_64")]
 mod wide_factor;
-mod workspace;
 
+pub use codes::{CodeScore, Codes};
 pub use dictionary::{Dictionary, PreparedRoom};
 pub use error::CodingError;
-pub use kkt::kkt_violation;
-pub use lasso::{CodeScore, Codes, encode, encode_signals, score_signals};
+pub use lasso::{encode, encode_signals, score_signals};
 pub use learn::{LearnParameters, LearnReport, learn};
+pub use optimality::kkt_violation;
 pub use signals::Signals;

@@ -2,7 +2,7 @@
 
 use super::CodingError;
 use super::dot::dot;
-use super::scan::padded;
+use super::rows::padded;
 use super::screen::Screen;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par};

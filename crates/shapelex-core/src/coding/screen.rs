@@ -6,7 +6,7 @@
 
 use super::Signals;
 use super::dispatch::{Kernel, fastest};
-use super::scan::{Lanes, Rows, padded};
+use super::rows::{Lanes, Rows, padded};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use std::ops::Range;

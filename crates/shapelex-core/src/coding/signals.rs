@@ -3,7 +3,7 @@
 use super::CodingError;
 use super::dispatch::{Kernel, fastest};
 use super::dot::dot;
-use super::lasso::column;
+use super::problem::column;
 use faer::{Mat, MatRef};
 
 /// N signals with what the Lasso needs of them under any dictionary.

@@ -1,7 +1,7 @@
 //! The passes of [`super::scan`] for processors with AVX-512, sixteen values at a time. Each does the same sequence of
 //! roundings as its portable form, so both give the same numbers.
 
-use super::scan::{Lanes, Rows};
+use super::rows::{Lanes, Rows};
 use std::arch::x86_64::*;
 
 /// Pieces of a row that are kept in registers while the terms are subtracted.

@@ -1,8 +1,8 @@
 //! Solves with [`super::cholesky::Factor`] for processors with AVX-512. Each does the same sequence of roundings as its
 //! portable form, so both give the same numbers.
 
-use super::cholesky::start;
 use super::dot::wide::sum_of_eight;
+use super::packed::start;
 use std::arch::x86_64::*;
 
 /// As [`super::cholesky::Factor::solve_lower`].

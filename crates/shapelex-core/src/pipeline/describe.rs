@@ -2,23 +2,11 @@
 
 use super::estimate::Role;
 use super::prepared::CleanShape;
-use super::{PipelineError, PreparedShape, Stage, Within};
+use super::{Description, PipelineError, PreparedShape, Stage, Within};
 use crate::cancel::Cancel;
 use crate::memory::MemoryBudget;
-use crate::mesh::{PrepareReport, TriangleSoup};
+use crate::mesh::TriangleSoup;
 use crate::parameters::{Hypothesis, Parameters};
-use crate::ranking::View;
-
-/// Everything a shape's coding needs.
-#[derive(Clone, Debug)]
-pub struct Description {
-    /// The ways the shape is seen. For a training shape one per channel; the first is always plain.
-    pub views: Vec<View>,
-    /// What preparing did.
-    pub report: PrepareReport,
-    /// The first eigenvalues of the plain view (up to 20), dimensionless.
-    pub eigenvalues: Vec<f64>,
-}
 
 /// Calls a function with memory that is not limited.
 fn unlimited<T>(cancel: &Cancel, describe: impl FnOnce(Within<'_>) -> T) -> T {

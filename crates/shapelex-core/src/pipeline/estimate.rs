@@ -2,7 +2,7 @@
 //!
 //! Each formula names what is held at the same time. `tests/estimates` compares them with what is allocated.
 
-use super::views::{AREA_SCALES, FIXED_ENERGIES};
+use super::fixed_grid::{AREA_SCALES, FIXED_ENERGIES};
 use crate::parameters::{Channel, Hypothesis, Parameters};
 use crate::spectral;
 

@@ -3,8 +3,10 @@
 //! [`learn_model`] (signatures → dictionaries) and [`rank`] (signatures × index → ranking).
 
 pub mod describe;
+pub mod description;
 pub mod error;
 pub mod estimate;
+mod fixed_grid;
 pub mod held_out;
 pub mod learn;
 mod near_copies;
@@ -14,9 +16,10 @@ pub mod views;
 pub mod within;
 
 pub use describe::{
-    Description, describe_both, describe_plain, describe_plain_within, describe_query, describe_query_within,
+    describe_both, describe_plain, describe_plain_within, describe_query, describe_query_within,
     describe_shape, describe_shape_within,
 };
+pub use description::Description;
 pub use error::PipelineError;
 pub use held_out::{HeldOutScores, held_out_scores};
 pub use learn::{Model, ModelReport, learn_model};

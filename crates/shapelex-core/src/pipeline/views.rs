@@ -1,36 +1,15 @@
 //! Spectra → the ways a shape is seen, as one that trains and as a query (docs/method.md#hypotheses).
 
+use super::fixed_grid::{AREA_SCALES, fixed_grid};
 use super::prepared::taken_as_part;
 use super::{PipelineError, PreparedShape};
 use crate::cancel::Cancel;
 use crate::parameters::{Channel, Hypothesis, Parameters};
 use crate::ranking::View;
 use crate::signature::describe_vertices;
-use crate::signature::descriptor::{Descriptor, DescriptorParameters, WksRange};
+use crate::signature::descriptor::DescriptorParameters;
 use crate::signature::normalise::normalise;
 use crate::spectral::Eigenpairs;
-
-/// Full area over visible area, as assumed for an open query (docs/method.md#hypotheses).
-pub(super) const AREA_SCALES: [f64; 4] = [2.0, 2.5, 3.0, 4.0];
-/// Energies of the fixed grid.
-pub(super) const FIXED_ENERGIES: usize = 100;
-/// σ on the fixed grid, in units of log λ.
-const FIXED_SIGMA: f64 = 0.27;
-/// Highest energy of the fixed grid: the logarithm of this many times n. Weyl's law has λ_n = 4π n on a closed surface of
-/// area 1.
-const FIXED_TOP: f64 = 15.0;
-
-/// The grid that doubled surfaces and training shapes share: 100 energies from log 10 to log 15 n, σ 0.27.
-fn fixed_grid(n: usize) -> DescriptorParameters {
-    let low = std::f64::consts::LN_10;
-    let high = (FIXED_TOP * n.max(2) as f64).ln();
-    DescriptorParameters {
-        descriptor: Descriptor::Wks,
-        dimension: FIXED_ENERGIES,
-        sigma_steps: FIXED_SIGMA * (FIXED_ENERGIES - 1) as f64 / (high - low),
-        range: WksRange::Fixed { low, high },
-    }
-}
 
 /// How many eigenpairs the signatures of a channel are built from, and their descriptor.
 pub fn channel_descriptor(channel: Channel, parameters: &Parameters) -> (usize, DescriptorParameters) {
@@ -38,6 +17,14 @@ pub fn channel_descriptor(channel: Channel, parameters: &Parameters) -> (usize, 
         Channel::FixedGrid => (parameters.part_eigenpairs, fixed_grid(parameters.part_eigenpairs)),
         Channel::Plain | Channel::Whitened => (parameters.eigenpairs, parameters.descriptor_parameters()),
     }
+}
+
+/// How a view sees the shape.
+struct Seen {
+    hypothesis: Hypothesis,
+    channel: Channel,
+    /// Full area over visible area that is assumed.
+    area_scale: f64,
 }
 
 impl PreparedShape {
@@ -65,9 +52,11 @@ impl PreparedShape {
                             doubled,
                             &vertices,
                             parameters,
-                            Hypothesis::Doubled,
-                            Channel::Plain,
-                            AREA_SCALES[0],
+                            Seen {
+                                hypothesis: Hypothesis::Doubled,
+                                channel: Channel::Plain,
+                                area_scale: AREA_SCALES[0],
+                            },
                         )?);
                     }
                 }
@@ -145,9 +134,11 @@ impl PreparedShape {
             &self.eigenpairs,
             vertices,
             parameters,
-            Hypothesis::Plain,
-            Channel::Plain,
-            1.0,
+            Seen {
+                hypothesis: Hypothesis::Plain,
+                channel: Channel::Plain,
+                area_scale: 1.0,
+            },
         )
     }
 
@@ -161,9 +152,11 @@ impl PreparedShape {
             &self.eigenpairs,
             vertices,
             parameters,
-            hypothesis,
-            Channel::FixedGrid,
-            1.0,
+            Seen {
+                hypothesis,
+                channel: Channel::FixedGrid,
+                area_scale: 1.0,
+            },
         )
     }
 
@@ -175,9 +168,11 @@ impl PreparedShape {
                     eigenpairs.as_ref().map_err(PipelineError::clone)?,
                     vertices,
                     parameters,
-                    Hypothesis::Whitened,
-                    Channel::Whitened,
-                    1.0,
+                    Seen {
+                        hypothesis: Hypothesis::Whitened,
+                        channel: Channel::Whitened,
+                        area_scale: 1.0,
+                    },
                 )
             })
             .transpose()
@@ -203,9 +198,11 @@ impl PreparedShape {
                     &scaled,
                     &vertices(i),
                     parameters,
-                    Hypothesis::Doubled,
-                    Channel::FixedGrid,
-                    scale,
+                    Seen {
+                        hypothesis: Hypothesis::Doubled,
+                        channel: Channel::FixedGrid,
+                        area_scale: scale,
+                    },
                 )
             })
             .collect()
@@ -217,10 +214,13 @@ impl PreparedShape {
         eigenpairs: &Eigenpairs,
         vertices: &[u32],
         parameters: &Parameters,
-        hypothesis: Hypothesis,
-        channel: Channel,
-        area_scale: f64,
+        seen: Seen,
     ) -> Result<View, PipelineError> {
+        let Seen {
+            hypothesis,
+            channel,
+            area_scale,
+        } = seen;
         let (n, descriptor) = channel_descriptor(channel, parameters);
         let mut signatures = describe_vertices(&eigenpairs.first(n), vertices, &descriptor)?;
         normalise(&mut signatures, parameters.normalisation);

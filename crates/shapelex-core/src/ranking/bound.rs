@@ -15,8 +15,8 @@
 
 use super::RankingError;
 use super::anchors::Anchors;
+use super::candidate::{Candidate, Measure};
 use super::score::{PreparedView, combine, trimmed_mean};
-use super::search::{Candidate, Search};
 use crate::coding::{Codes, CodingError, Dictionary, Signals, encode_signals};
 use crate::parameters::{Channel, Hypothesis, RankBy};
 use faer::Mat;
@@ -72,7 +72,7 @@ impl<'a> Level<'a> {
     /// A number no larger than the candidate's score by what the search ranks by, the mean or the trimmed objective.
     pub fn bound(
         &self,
-        search: &Search<'_>,
+        measure: &Measure<'_>,
         candidate: Candidate<'_>,
         memory: &mut BoundMemory,
     ) -> Result<f64, RankingError> {
@@ -86,9 +86,9 @@ impl<'a> Level<'a> {
                         class: candidate.label.to_owned(),
                         channel: view.channel,
                     })?;
-            let codes = encode_signals(dictionary, &view.points, search.lambda, search.cancel)?;
+            let codes = encode_signals(dictionary, &view.points, measure.lambda, measure.cancel)?;
             residuals(dictionary, &view.anchors.points, &codes, &mut memory.residuals);
-            let bound = if search.rank_by == RankBy::TrimmedObjective {
+            let bound = if measure.rank_by == RankBy::TrimmedObjective {
                 trimmed_dual_value(view, memory)
             } else {
                 dual_value(view.anchors, &memory.residuals)

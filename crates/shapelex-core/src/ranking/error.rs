@@ -17,5 +17,10 @@ pub enum RankingError {
     NoPlainView,
     /// A class lacks the dictionary a view has to be coded under.
     #[error("class {class} has no dictionary for the {channel:?} channel")]
-    MissingChannel { class: String, channel: Channel },
+    MissingChannel {
+        /// The class's label.
+        class: String,
+        /// The channel.
+        channel: Channel,
+    },
 }

@@ -3,6 +3,7 @@
 mod anchors;
 mod bound;
 pub mod calibration;
+mod candidate;
 mod coarse;
 pub mod error;
 pub mod index;

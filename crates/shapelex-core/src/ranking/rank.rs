@@ -1,7 +1,8 @@
 //! Class scores → ranking.
 
+use super::candidate::{Candidate, Measure};
 use super::score::{Score, measure, prepare_views};
-use super::search::{Candidate, Scored, Search};
+use super::search::{Scored, Search};
 use super::{Index, RankingError, View};
 use crate::cancel::{Cancel, Cancelled};
 use crate::coding::CodingError;
@@ -158,9 +159,11 @@ fn ranking(
     let prepared = prepare_views(views, rank_by)?;
     let search = Search {
         views: &prepared,
-        lambda: index.parameters.lambda,
-        rank_by: measure(&prepared, rank_by),
-        cancel,
+        measure: Measure {
+            lambda: index.parameters.lambda,
+            rank_by: measure(&prepared, rank_by),
+            cancel,
+        },
     };
     let candidates: Vec<_> = index
         .classes

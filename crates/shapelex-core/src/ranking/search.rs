@@ -3,13 +3,11 @@
 use super::RankingError;
 use super::anchors::anchors;
 use super::bound::{BoundMemory, Level};
+use super::candidate::{Candidate, Measure};
 use super::score::{PreparedView, Score, score};
-use crate::cancel::Cancel;
-use crate::coding::{CodingError, Dictionary};
-use crate::parameters::{Channel, RankBy};
+use crate::coding::CodingError;
+use crate::parameters::RankBy;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// Anchors of the bounds, coarse to fine: the first is for all candidates, the second for those it leaves.
 const SIZES: [usize; 2] = [24, 96];
@@ -20,19 +18,10 @@ const WORTHWHILE: usize = 4;
 /// Candidates coded together. Fixed, so that what is left out does not depend on the number of threads.
 const BATCH: usize = 16;
 
-/// Something with dictionaries to be ranked by: a class or a shape.
-#[derive(Clone, Copy)]
-pub(super) struct Candidate<'a> {
-    pub label: &'a str,
-    pub dictionaries: &'a BTreeMap<Channel, Arc<Dictionary>>,
-}
-
 /// Ranks candidates for one query.
 pub(super) struct Search<'a> {
     pub views: &'a [PreparedView<'a>],
-    pub lambda: f64,
-    pub rank_by: RankBy,
-    pub cancel: &'a Cancel,
+    pub measure: Measure<'a>,
 }
 
 /// Candidates' numbers and their scores.
@@ -51,7 +40,7 @@ impl Search<'_> {
         let signals = self.views.iter().map(|v| v.matrix().ncols()).min().unwrap_or(0);
         let mut found = match wanted {
             Some(wanted)
-                if self.rank_by != RankBy::Frobenius
+                if self.measure.rank_by != RankBy::Frobenius
                     && candidates.len() / WORTHWHILE > wanted
                     && signals >= SIZES[0] * SIGNALS_PER_ANCHOR =>
             {
@@ -121,8 +110,12 @@ impl Search<'_> {
     /// The number and the score of one candidate.
     fn score(&self, candidates: &[Candidate<'_>], i: usize) -> Result<(usize, Score), RankingError> {
         let Candidate { label, dictionaries } = candidates[i];
-        let (lambda, rank_by) = (self.lambda, self.rank_by);
-        let score = score(self.views, dictionaries, lambda, rank_by, label, self.cancel)?;
+        let Measure {
+            lambda,
+            rank_by,
+            cancel,
+        } = self.measure;
+        let score = score(self.views, dictionaries, lambda, rank_by, label, cancel)?;
         Ok((i, score))
     }
 
@@ -136,7 +129,7 @@ impl Search<'_> {
         let mut bounds = numbers
             .into_par_iter()
             .map_init(BoundMemory::default, |memory, i| {
-                let bound = level.bound(self, candidates[i], memory)?;
+                let bound = level.bound(&self.measure, candidates[i], memory)?;
                 Ok((bound, i))
             })
             .collect::<Result<Vec<Bounded>, RankingError>>()?;

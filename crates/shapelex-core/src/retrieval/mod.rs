@@ -14,10 +14,12 @@ pub mod index;
 pub mod judge;
 pub mod method;
 pub mod outcome;
+pub mod ranked;
 
 pub use deadline::{AtDeadline, Deadline};
 pub use engine::{QueryEngine, QuerySpec};
 pub use error::QueryError;
 pub use index::SearchIndex;
 pub use method::RankingMethod;
-pub use outcome::{QueryOutcome, RankedClass, RankedShape};
+pub use outcome::QueryOutcome;
+pub use ranked::{RankedClass, RankedShape};

@@ -1,7 +1,7 @@
 //! Heat Kernel Signature (Sun, Ovsjanikov, Guibas 2009, Eq. 3 and section 4).
 
-use super::descriptor::Spectrum;
 use super::grid::linspace;
+use super::spectrum::Spectrum;
 use faer::Mat;
 
 /// HKS of the given vertices: M × N.

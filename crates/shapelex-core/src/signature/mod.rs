@@ -5,8 +5,10 @@ pub mod grid;
 pub mod hks;
 pub mod local;
 pub mod normalise;
+pub mod options;
 pub mod sample;
 pub mod si_hks;
+pub mod spectrum;
 pub mod wks;
 
 pub use descriptor::{Descriptor, DescriptorParameters, describe_vertices};

@@ -1,6 +1,6 @@
 //! Scale-invariant Heat Kernel Signature (Bronstein, Kokkinos 2010, section 3).
 
-use super::descriptor::Spectrum;
+use super::spectrum::Spectrum;
 use faer::Mat;
 use std::f64::consts::TAU;
 

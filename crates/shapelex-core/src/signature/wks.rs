@@ -1,7 +1,8 @@
 //! Wave Kernel Signature (docs/method.md#signature; Aubry, Schlickewei, Cremers 2011, Eq. 8 and 9).
 
-use super::descriptor::{DescriptorParameters, Spectrum, WksRange};
 use super::grid::linspace;
+use super::options::{DescriptorParameters, WksRange};
+use super::spectrum::Spectrum;
 use faer::Mat;
 
 /// Energies and width of a WKS for one spectrum.

@@ -3,31 +3,10 @@
 use super::normalised::Normalised;
 use super::rows::Rows;
 use super::solve::{self, ZERO};
-use super::{Operators, SpectralError};
+use super::{EigenOptions, Operators, SpectralError};
 use crate::cancel::Cancel;
 use faer::Mat;
-use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
-
-/// How the eigen-solve is run.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct EigenOptions {
-    /// Largest ‖Wφ − λAφ‖_{A⁻¹} / (λ ‖φ‖_A) accepted, beyond what rounding of the operator itself explains.
-    pub tolerance: f64,
-    /// Seed of the starting block.
-    pub seed: u64,
-}
-
-impl Default for EigenOptions {
-    /// Residual 1e-6, seed 1. Eigenvalues are then right to about the square of it.
-    fn default() -> Self {
-        Self {
-            tolerance: 1e-6,
-            seed: 1,
-        }
-    }
-}
 
 /// Eigenpairs in ascending order.
 #[derive(Clone, Debug)]

@@ -15,6 +15,8 @@ mod lanczos;
 mod loss;
 mod near;
 mod normalised;
+pub mod options;
+mod pairs;
 mod parts;
 mod residual;
 mod rows;
@@ -24,6 +26,7 @@ mod simd;
 mod solve;
 
 pub use doubled::{dirichlet_eigenpairs, doubled_eigenpairs};
-pub use eigen::{EigenOptions, Eigenpairs, estimated_bytes, smallest_eigenpairs};
+pub use eigen::{Eigenpairs, estimated_bytes, smallest_eigenpairs};
 pub use error::SpectralError;
 pub use laplacian::{Operators, assemble};
+pub use options::EigenOptions;

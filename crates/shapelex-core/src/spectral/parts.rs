@@ -5,8 +5,8 @@
 //! wide: dozens of equal pieces are beyond it. This is the way out.
 
 use super::normalised::Normalised;
+use super::pairs::Pairs;
 use super::rows::Rows;
-use super::solve::Pairs;
 use super::{EigenOptions, SpectralError};
 use crate::cancel::Cancel;
 

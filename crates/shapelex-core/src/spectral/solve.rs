@@ -8,8 +8,9 @@ use super::basis::Basis;
 use super::dense;
 use super::lanczos::{Lanczos, Ritz};
 use super::normalised::{Normalised, NullSpace};
+use super::pairs::Pairs;
 use super::parts::smallest_by_parts;
-use super::residual::{self, Check};
+use super::residual::{self};
 use super::rows::Rows;
 use super::shift_invert::{Analysis, Factor};
 use super::simd::Row;
@@ -17,15 +18,6 @@ use super::{EigenOptions, SpectralError};
 use crate::cancel::Cancel;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-
-/// Eigenpairs of S outside its null space.
-pub struct Pairs {
-    /// Ascending.
-    pub values: Vec<f64>,
-    /// n × k, rows by their places in S.
-    pub vectors: Rows,
-    pub check: Check,
-}
 
 /// Share of the wanted eigenvalues that should lie below the shift, and how far off is good enough.
 const BELOW_SHIFT: f64 = 0.58;

@@ -3,7 +3,7 @@
 use super::rows::{Row, Rows};
 use super::sets::Set;
 use super::settings::Settings;
-use shapelex_eval::benchmark::evaluate::counts_as;
+use shapelex_eval::benchmark::query_result::counts_as;
 use std::collections::BTreeMap;
 
 /// The columns of a report.

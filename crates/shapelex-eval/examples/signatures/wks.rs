@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use shapelex_core::cancel::Cancel;
 use shapelex_core::parameters::Parameters;
 use shapelex_core::pipeline::describe_both;
-use shapelex_eval::benchmark::evaluate::{Models, run_rounds};
+use shapelex_eval::benchmark::evaluate::{Models, Trial, run_rounds};
 use shapelex_eval::benchmark::{LabelledShape, Round};
 use std::error::Error;
 use std::path::Path;
@@ -33,15 +33,12 @@ pub fn rows(set: &Set, cache: &Path, _settings: &Settings) -> Result<Rows, Box<d
         })
         .collect::<Result<_, shapelex_core::pipeline::PipelineError>>()?;
     let answer = |rounds: &[Round]| -> Result<Vec<Row>, Box<dyn Error>> {
-        let results = run_rounds(
-            &shapes,
+        let trial = Trial {
             rounds,
-            &parameters,
-            &set.same,
-            &Models::new(),
-            &Cancel::new(),
-            &|_, _| (),
-        )?;
+            same: &set.same,
+            given: &Models::new(),
+        };
+        let results = run_rounds(&shapes, &trial, &parameters, &Cancel::new(), &|_, _| ())?;
         let asked = rounds
             .iter()
             .enumerate()

@@ -1,7 +1,7 @@
 //! How good lists of ranked classes are, with intervals.
 
-use super::evaluate::{QueryResult, counts_as};
 use super::measures::{RetrievalMeasures, Z, wilson};
+use super::query_result::{QueryResult, counts_as};
 use serde::{Deserialize, Serialize};
 
 /// A mean over queries and its 95 % interval, from 0 to 1.

@@ -2,6 +2,7 @@
 
 use super::class_measures::ClassMeasures;
 use super::protocol::{Protocol, Round, rounds};
+use super::query_result::{QueryResult, counts_as};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use shapelex_core::cancel::Cancel;
@@ -23,24 +24,6 @@ pub struct LabelledShape {
     pub training: Description,
     /// As a query.
     pub query: Description,
-}
-
-/// One query's answer.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct QueryResult {
-    /// The true class.
-    pub class: String,
-    /// The shape's name.
-    pub name: String,
-    /// All classes of the round with their scores, best first.
-    pub ranked: Vec<(String, f64)>,
-    /// Whether the best class is the true one or counts as the same.
-    pub correct: bool,
-    /// Position of the first class that counts as true, 1 for the best.
-    pub true_rank: usize,
-    /// (best score among the true − best score among the false) / the latter: above 0 where it was mistaken, the
-    /// larger the worse.
-    pub error_margin: f64,
 }
 
 /// The outcome of a protocol.
@@ -89,15 +72,12 @@ pub fn evaluate(
     let classes: Vec<&str> = shapes.iter().map(|s| s.class.as_str()).collect();
     let names: Vec<&str> = shapes.iter().map(|s| s.name.as_str()).collect();
     let rounds = rounds(protocol, &classes, &names);
-    let queries = run_rounds(
-        shapes,
-        &rounds,
-        parameters,
+    let trial = Trial {
+        rounds: &rounds,
         same,
-        &Models::new(),
-        cancel,
-        progress,
-    )?;
+        given: &Models::new(),
+    };
+    let queries = run_rounds(shapes, &trial, parameters, cancel, progress)?;
     let single = match protocol {
         Protocol::LeaveOneOut | Protocol::KFold { .. } => {
             shapes.len() - rounds.iter().map(|r| r.query.len()).sum::<usize>()
@@ -111,6 +91,17 @@ pub fn evaluate(
 /// Models by the shapes they were learnt from.
 pub type Models = HashMap<Vec<usize>, Arc<Model>>;
 
+/// What [`run_rounds`] runs.
+#[derive(Clone, Copy)]
+pub struct Trial<'a> {
+    /// Which shapes train and which are queried, round by round.
+    pub rounds: &'a [Round],
+    /// Classes that count as one.
+    pub same: &'a [Vec<String>],
+    /// Models that are learnt already.
+    pub given: &'a Models,
+}
+
 /// Learns what the rounds need, beyond what is `given`, and answers their queries. `progress(done, total)` counts
 /// dictionaries and queries.
 ///
@@ -118,13 +109,12 @@ pub type Models = HashMap<Vec<usize>, Arc<Model>>;
 /// The first error of learning or ranking.
 pub fn run_rounds(
     shapes: &[LabelledShape],
-    rounds: &[Round],
+    trial: &Trial<'_>,
     parameters: &Parameters,
-    same: &[Vec<String>],
-    given: &Models,
     cancel: &Cancel,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<QueryResult>, PipelineError> {
+    let Trial { rounds, same, given } = *trial;
     let mut uses: HashMap<&[usize], usize> = HashMap::new();
     for members in rounds.iter().flat_map(|r| r.train.values()) {
         *uses.entry(members).or_default() += 1;
@@ -189,12 +179,6 @@ pub fn run_rounds(
         .map(answer)
         .collect::<Result<Vec<_>, PipelineError>>()?;
     Ok(answers.into_iter().flatten().collect())
-}
-
-/// Whether an answer of class `answered` to a query of class `class` counts as right.
-pub fn counts_as(class: &str, answered: &str, same: &[Vec<String>]) -> bool {
-    let within = |group: &Vec<String>, name: &str| group.iter().any(|c| c == name);
-    class == answered || same.iter().any(|g| within(g, class) && within(g, answered))
 }
 
 /// Compares a ranking of classes, best first, with the truth.

@@ -1,7 +1,8 @@
 //! The baselines in a benchmark: every shape one vector, the class of the nearest training shape the answer.
 
-use super::evaluate::{QueryResult, judge};
+use super::evaluate::judge;
 use super::protocol::Round;
+use super::query_result::QueryResult;
 use super::robustness::Member;
 use rayon::prelude::*;
 use shapelex_core::baseline::{SignatureDistances, Vocabulary, distance, sample_distances};

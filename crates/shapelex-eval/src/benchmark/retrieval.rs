@@ -1,7 +1,8 @@
 //! Shape against shape: who is nearest to whom, and how good the lists are.
 
-use super::evaluate::{LabelledShape, Models, counts_as};
+use super::evaluate::{LabelledShape, Models};
 use super::measures::RetrievalMeasures;
+use super::query_result::counts_as;
 use faer::Mat;
 use rayon::prelude::*;
 use shapelex_core::cancel::Cancel;

@@ -1,10 +1,11 @@
 //! One unit of a benchmark: one method under one protocol over one category.
 
-use super::evaluate::{LabelledShape, Models, QueryResult, run_rounds};
+use super::evaluate::{LabelledShape, Models, Trial, run_rounds};
 use super::measures::RetrievalMeasures;
 use super::method::Method;
 use super::nearest::{Inputs, nearest_rounds, nearest_scores};
 use super::protocol::Round;
+use super::query_result::{QueryResult, counts_as};
 use super::report::{Count, DistanceHistogram, Mistake};
 use super::retrieval::{RetrievalOutcome, coding_scores, judge_retrieval};
 use super::robustness::{Member, Robustness, robustness_rounds};
@@ -159,15 +160,12 @@ fn coding(
         let scores = coding_scores(&labelled, parameters, nulls, cancel, &|_, _| ())?;
         return Ok(of_retrieval(&scores, shapes));
     }
-    let queries = run_rounds(
-        &labelled,
+    let trial = Trial {
         rounds,
-        parameters,
-        shapes.same,
-        nulls,
-        cancel,
-        &|_, _| (),
-    )?;
+        same: shapes.same,
+        given: nulls,
+    };
+    let queries = run_rounds(&labelled, &trial, parameters, cancel, &|_, _| ())?;
     Ok(of_queries(&[queries], shapes))
 }
 
@@ -352,7 +350,7 @@ fn of_retrieval(scores: &[Vec<f64>], shapes: &Shapes<'_>) -> Outcome {
     } = judge_retrieval(scores, &classes, shapes.same);
     let wrong = |(i, j): (usize, Option<usize>)| {
         let answered = classes[j?];
-        let right = super::evaluate::counts_as(classes[i], answered, shapes.same);
+        let right = counts_as(classes[i], answered, shapes.same);
         (!right).then(|| mistake(shapes.category, &shapes.members[i], answered))
     };
     Outcome {

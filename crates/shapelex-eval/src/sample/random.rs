@@ -138,9 +138,7 @@ fn skeleton(rng: &mut impl Rng) -> Skeleton {
         s.tail(
             hips,
             [0.0, 0.1 * girth, -0.85 * half],
-            length,
-            angle,
-            [radius, tip.max(0.04)],
+            [length, angle, radius, tip.max(0.04)],
             4,
         );
     }

@@ -120,11 +120,13 @@ impl Quadruped {
                 let phase = if side == Side::Left { 0.0 } else { 0.5 } + 0.3 * pair as f64;
                 let chain = leg.attach(
                     &mut s,
-                    bone,
                     side,
-                    [stance, joint[1], joint[2]],
-                    self.swing,
-                    pair == 1,
+                    &Hip {
+                        bone,
+                        joint: [stance, joint[1], joint[2]],
+                        swing: self.swing,
+                        hind: pair == 1,
+                    },
                 );
                 s.walks(&chain[..2], phase);
                 limbs.push(chain);
@@ -150,9 +152,8 @@ impl Quadruped {
         let (head, skull) = self.head.attach(&mut s, above, top);
 
         if self.tail_bones > 0 {
-            let [length, angle, r0, r1] = self.tail;
             let root = add(rear, [0.0, 0.4 * self.rump[1], -0.32 * self.trunk]);
-            s.tail(hips, root, length, angle, [r0, r1], self.tail_bones);
+            s.tail(hips, root, self.tail, self.tail_bones);
         }
         let landmarks = Landmarks {
             hips,
@@ -165,17 +166,25 @@ impl Quadruped {
     }
 }
 
+/// Where a leg hangs on the body.
+struct Hip {
+    bone: usize,
+    joint: Vec3,
+    /// How far it swings, in degrees.
+    swing: f64,
+    /// Hind legs bend the other way.
+    hind: bool,
+}
+
 impl Leg {
-    /// Hangs the leg on a bone at `joint`; hind legs bend the other way. Returns its bones.
-    fn attach(
-        &self,
-        s: &mut Skeleton,
-        bone: usize,
-        side: Side,
-        joint: Vec3,
-        swing: f64,
-        hind: bool,
-    ) -> Vec<usize> {
+    /// Hangs the leg on the body. Returns its bones.
+    fn attach(&self, s: &mut Skeleton, side: Side, hip: &Hip) -> Vec<usize> {
+        let Hip {
+            bone,
+            joint,
+            swing,
+            hind,
+        } = *hip;
         let [x, y, z] = joint;
         let [r0, r1, r2, r3] = self.radii;
         let ankle = [x, y * self.joints[1], z + self.forward[1]];
@@ -223,14 +232,13 @@ impl Head {
 }
 
 impl Skeleton {
-    /// A tail of equal bones, at an angle above the backward horizontal. Returns its bones.
+    /// A tail of equal bones: its length, its angle above the backward horizontal in degrees, its radius at the root and at
+    /// the tip. Returns its bones.
     pub(in crate::sample) fn tail(
         &mut self,
         bone: usize,
         root: Vec3,
-        length: f64,
-        angle: f64,
-        [r0, r1]: [f64; 2],
+        [length, angle, r0, r1]: [f64; 4],
         bones: usize,
     ) -> Vec<usize> {
         let points: Vec<(Vec3, f64)> = (0..=bones)

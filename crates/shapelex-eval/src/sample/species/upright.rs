@@ -117,7 +117,7 @@ pub(super) fn kangaroo() -> Skeleton {
         ear_set: [20.0, 0.6],
     };
     head.attach(&mut s, neck[0], [0.0, 1.34, 0.33]);
-    s.tail(hips, [0.0, 0.48, -0.16], 1.05, -22.0, [0.12, 0.04], 5);
+    s.tail(hips, [0.0, 0.48, -0.16], [1.05, -22.0, 0.12, 0.04], 5);
     s
 }
 

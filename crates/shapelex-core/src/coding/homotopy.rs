@@ -3,17 +3,17 @@
 //!
 //! At the level ℓ = max |d_jᵀs| the code is zero. As ℓ falls to λ, the values of the atoms in the set move on straight
 //! lines that keep |q_j| = ℓ for them; an atom enters where its |q_j| meets ℓ and leaves where its value meets zero. For
-//! few non-zeros that is hardly more looks at the gradient than the code has atoms, and it needs no neighbour.
+//! few non-zeros that is hardly more looks at the gradient than the code has atoms, and it needs no start.
 
-use super::active_set::{ActiveSet, Problem};
 use super::dot::dot;
-use super::lasso::column;
+use super::problem::{Problem, column};
+use super::rows::{Lanes, pieces};
 use super::scan::{first_crossing, largest_magnitude, move_towards, place_of, residual_gradient};
 
 /// Atoms that the path may hold. Beyond about so many the active set, which takes in several atoms at a look, is faster.
-pub(super) const REACH: usize = 8;
+pub(super) const MAX_ACTIVE: usize = 8;
 /// Steps after which rounding must have led the path in a circle.
-const STEPS: usize = 4 * REACH;
+const MAX_STEPS: usize = 4 * MAX_ACTIVE;
 /// The smallest pivot, relative to an atom's squared norm, that the path goes on with.
 const DEPENDENT: f64 = 1e-10;
 
@@ -22,28 +22,28 @@ const DEPENDENT: f64 = 1e-10;
 pub(super) struct Path {
     /// Atoms in the set; the arrays hold nothing beyond.
     pub count: usize,
-    pub atoms: [usize; REACH],
+    pub atoms: [usize; MAX_ACTIVE],
     /// The code at the level reached.
-    pub values: [f64; REACH],
-    pub signs: [f64; REACH],
+    pub values: [f64; MAX_ACTIVE],
+    pub signs: [f64; MAX_ACTIVE],
     /// d_jᵀs, as exactly as it is known.
-    pub correlations: [f64; REACH],
+    pub correlations: [f64; MAX_ACTIVE],
     /// The code at λ if the set stays as it is.
-    target: [f64; REACH],
+    target: [f64; MAX_ACTIVE],
     /// F⁻¹ (c_A − λ sign).
-    forward: [f64; REACH],
+    forward: [f64; MAX_ACTIVE],
     /// Lower, by rows, F Fᵀ = G_AA; the diagonal apart, as reciprocals.
-    factor: [[f64; REACH]; REACH],
-    inverse_diagonal: [f64; REACH],
+    factor: [[f64; MAX_ACTIVE]; MAX_ACTIVE],
+    inverse_diagonal: [f64; MAX_ACTIVE],
 }
 
 /// How far the path came.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Arrival {
+pub(super) enum Outcome {
     /// At the exact solution.
     Solved,
     /// At a set that may still be wrong, each value on the side of its sign or zero.
-    Near,
+    Truncated,
 }
 
 impl Path {
@@ -68,7 +68,7 @@ impl Path {
         let j = self.atoms[n];
         let diagonal = problem.squares[j];
         let mut pivot = diagonal;
-        let mut row = [0.0; REACH];
+        let mut row = [0.0; MAX_ACTIVE];
         for i in 0..n {
             let mut value = problem.product(self.atoms[i], j);
             for (above, x) in self.factor[i][..i].iter().zip(&row) {
@@ -138,7 +138,7 @@ impl Path {
     }
 
     /// Goes over to exact correlations. Returns by how much that changed any d_jᵀDa with ‖d_j‖ ≤ 1, at most, as
-    /// [`ActiveSet::sharpen`] does; infinity where a value left the side of its sign.
+    /// `ActiveSet::sharpen` does; infinity where a value left the side of its sign.
     #[inline(always)]
     fn sharpen(&mut self, problem: &Problem<'_>) -> f64 {
         let mut shift2 = 0.0;
@@ -159,30 +159,54 @@ impl Path {
     }
 }
 
-impl ActiveSet {
+/// Follows the path, in memory that it keeps.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Homotopy {
+    /// What the last path ended with.
+    pub path: Path,
+    /// The gradient at λ if the set stays as it is.
+    gradient: Vec<Lanes>,
+    /// The gradient at the level that the path has reached.
+    gradient_at_level: Vec<Lanes>,
+    /// Where on the rest of the path each |q_j| meets the level.
+    crossings: Vec<Lanes>,
+}
+
+impl Homotopy {
+    /// Makes room for a dictionary of `atoms` atoms.
+    pub fn reset(&mut self, atoms: usize) {
+        let rows = [
+            &mut self.gradient,
+            &mut self.gradient_at_level,
+            &mut self.crossings,
+        ];
+        for row in rows {
+            row.resize(pieces(atoms), Lanes::default());
+        }
+    }
+
     /// Follows the path of `problem` to λ. What it ends with is in `path`.
     #[inline(always)]
-    pub fn trace(&mut self, problem: &Problem<'_>) -> Arrival {
+    pub fn follow(&mut self, problem: &Problem<'_>) -> Outcome {
         let Self {
             path,
             gradient,
-            here,
+            gradient_at_level: here,
             crossings,
-            ..
         } = self;
         path.count = 0;
         let rough = problem.rough_correlation;
         let largest = largest_magnitude(rough);
         let mut level = f64::from(largest);
         if level + problem.error <= problem.lambda {
-            return Arrival::Solved;
+            return Outcome::Solved;
         }
         let mut next = place_of(rough, largest).map(|j| (j, f64::from(rough.as_flattened()[j])));
-        for step in 0..STEPS {
+        for step in 0..MAX_STEPS {
             if let Some((j, gradient)) = next {
                 let correlation = f64::from(rough.as_flattened()[j]);
-                if path.count == REACH || !path.append(problem, j, gradient.signum(), correlation) {
-                    return Arrival::Near;
+                if path.count == MAX_ACTIVE || !path.append(problem, j, gradient.signum(), correlation) {
+                    return Outcome::Truncated;
                 }
             }
             path.solve_backwards();
@@ -207,9 +231,9 @@ impl ActiveSet {
                 let largest = f64::from(largest_magnitude(gradient));
                 let shift = path.sharpen(problem);
                 if largest + error + shift <= problem.lambda + problem.tolerance {
-                    return Arrival::Solved;
+                    return Outcome::Solved;
                 }
-                return Arrival::Near;
+                return Outcome::Truncated;
             }
             let from: &[_] = if step == 0 { rough } else { here };
             let bounds = [level, problem.lambda, limit].map(|x| x as f32);
@@ -221,7 +245,7 @@ impl ActiveSet {
             let way = match (next, zero) {
                 (Some(_), _) => f64::from(share),
                 (None, Some((_, leaves))) => leaves,
-                (None, None) => return Arrival::Near,
+                (None, None) => return Outcome::Truncated,
             };
             share = way as f32;
             for k in 0..count {
@@ -238,13 +262,13 @@ impl ActiveSet {
             move_towards(here, gradient, share);
             if next.is_none() {
                 let Some((k, _)) = zero else {
-                    return Arrival::Near;
+                    return Outcome::Truncated;
                 };
                 if !path.remove(problem, k) || path.count == 0 {
-                    return Arrival::Near;
+                    return Outcome::Truncated;
                 }
             }
         }
-        Arrival::Near
+        Outcome::Truncated
     }
 }

@@ -1,12 +1,12 @@
 //! Codes of many signals one after the other, in memory that each thread keeps.
 
-use super::active_set::{ActiveSet, Problem};
+use super::active_set::ActiveSet;
+use super::coordinate_descent::coordinate_descent;
 use super::dispatch::{Kernel, fastest};
 use super::dot::dot;
-use super::kkt::coordinate_descent;
-use super::lasso::column;
 use super::prepared::Prepared;
-use super::scan::pieces;
+use super::problem::{Problem, column};
+use super::rows::pieces;
 use super::screen::ScreenMemory;
 use super::{CodeScore, Codes, CodingError, Signals};
 use crate::cancel::Cancel;
@@ -30,12 +30,19 @@ const SMALL_RESIDUAL: f64 = 1e-4;
 const KEPT: usize = 1 << 18;
 
 thread_local! {
-    static WORKSPACE: RefCell<Workspace> = RefCell::default();
+    static ENCODER: RefCell<Encoder> = RefCell::default();
+}
+
+/// Sums over a code: ‖a‖₁ and cᵀa, c the correlations of the atoms with the signal.
+#[derive(Clone, Copy)]
+struct Sums {
+    norm1: f64,
+    product: f64,
 }
 
 /// Memory that coding reuses from call to call; the results do not depend on what it was used for before.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Workspace {
+pub(super) struct Encoder {
     screen: ScreenMemory,
     set: ActiveSet,
     code: Vec<f64>,
@@ -48,22 +55,22 @@ pub(super) struct Workspace {
     products: usize,
 }
 
-/// Lends the thread's workspace out.
+/// Lends the thread's encoder out.
 ///
 /// A query codes its signals under one dictionary after the other, for a fraction of a millisecond each; memory given
 /// back to the system and asked for anew costs page faults.
-pub(super) fn with_kept<T>(work: impl FnOnce(&mut Workspace) -> T) -> T {
-    WORKSPACE.with_borrow_mut(|workspace| {
-        let outcome = work(workspace);
-        if workspace.arena.capacity().max(workspace.solved.capacity()) > KEPT {
-            *workspace = Workspace::default();
+pub(super) fn with_kept<T>(work: impl FnOnce(&mut Encoder) -> T) -> T {
+    ENCODER.with_borrow_mut(|encoder| {
+        let outcome = work(encoder);
+        if encoder.arena.capacity().max(encoder.solved.capacity()) > KEPT {
+            *encoder = Encoder::default();
         }
         outcome
     })
 }
 
 struct CodeBlock<'a> {
-    workspace: &'a mut Workspace,
+    encoder: &'a mut Encoder,
     dictionary: &'a Prepared,
     signals: &'a Signals<'a>,
     block: Range<usize>,
@@ -77,18 +84,18 @@ impl Kernel for CodeBlock<'_> {
     #[inline(always)]
     fn run(self) -> Self::Output {
         let Self {
-            workspace,
+            encoder,
             dictionary,
             signals,
             block,
             lambda,
             cancel,
         } = self;
-        workspace.code_block(dictionary, signals, block, lambda, cancel)
+        encoder.code_block(dictionary, signals, block, lambda, cancel)
     }
 }
 
-impl Workspace {
+impl Encoder {
     /// Codes all signals.
     pub fn run(
         &mut self,
@@ -108,7 +115,7 @@ impl Workspace {
                 .screen()
                 .correlate(signals, block.clone(), &mut self.screen);
             fastest(CodeBlock {
-                workspace: self,
+                encoder: self,
                 dictionary,
                 signals,
                 block,
@@ -183,8 +190,8 @@ impl Workspace {
                 tolerance: KKT_TOLERANCE * lambda + 1e-14 * norm2.sqrt(),
             };
             let start = self.arena.len();
-            let solved = self.set.solve_by_path(&problem);
-            self.products += self.set.path.count * self.set.path.count / 2;
+            let solved = self.set.solve_by_homotopy(&problem);
+            self.products += self.set.homotopy.path.count * self.set.homotopy.path.count / 2;
             if solved {
                 let score = self.path_score(&problem, norm2, i)?;
                 self.solved.push((self.arena.len(), score));
@@ -215,7 +222,7 @@ impl Workspace {
         norm2: f64,
         number: usize,
     ) -> Result<CodeScore, CodingError> {
-        let path = &self.set.path;
+        let path = &self.set.homotopy.path;
         let start = self.arena.len();
         let (mut norm1, mut product) = (0.0, 0.0);
         for k in 0..path.count {
@@ -226,7 +233,8 @@ impl Workspace {
         if path.count > 1 {
             self.arena[start..].sort_unstable_by_key(|&(j, _)| j);
         }
-        self.cost(problem, norm2, start, number, norm1, product)
+        let sums = Sums { norm1, product };
+        self.cost(problem, norm2, start, number, sums)
     }
 
     /// Sorts the code that starts at `start` and says what it costs.
@@ -245,7 +253,8 @@ impl Workspace {
             norm1 += a.abs();
             product += self.set.correlation(problem, j as usize) * a;
         }
-        self.cost(problem, norm2, start, number, norm1, product)
+        let sums = Sums { norm1, product };
+        self.cost(problem, norm2, start, number, sums)
     }
 
     #[inline(always)]
@@ -255,8 +264,7 @@ impl Workspace {
         norm2: f64,
         start: usize,
         number: usize,
-        norm1: f64,
-        product: f64,
+        Sums { norm1, product }: Sums,
     ) -> Result<CodeScore, CodingError> {
         let code = &self.arena[start..];
         // At the optimum aᵀGa = cᵀa − λ‖a‖₁.
@@ -285,7 +293,7 @@ impl Workspace {
         Ok(score)
     }
 
-    /// Where the active set from the neighbour's code failed: once more from nothing, then coordinate descent.
+    /// Where the homotopy failed: the active set from nothing, then coordinate descent.
     #[cold]
     #[inline(never)]
     fn fall_back(
