@@ -22,9 +22,9 @@ pub fn config(ca_cert: Option<&Path>) -> Result<TlsConfig, CliError> {
     Ok(TlsConfig::builder().root_certs(roots).build())
 }
 
-/// Trust in the service of this machine whose data directory is at hand. Its certificate names its public host, not the
-/// loopback address it is reached by, and may be self-signed, so it is not checked. The address comes from a file that
-/// only the directory's owner can write, and the packets do not leave the machine.
+/// No check of the certificate, for a service on this machine. The certificate names the service's public host, not its
+/// loopback address, and may be self-signed. The address comes from a file in the data directory that only its owner can
+/// write, and the packets do not leave the machine.
 pub fn this_machine() -> TlsConfig {
     TlsConfig::builder().disable_verification(true).build()
 }

@@ -6,7 +6,7 @@ use axum::http::request::Parts as RequestParts;
 use std::convert::Infallible;
 use std::sync::Arc;
 
-/// Who asks: a key, or nobody in particular where keys are off. Among the extensions of every request.
+/// The API key a request came with, if any. Among the extensions of every request.
 #[derive(Clone, Debug, Default)]
 pub struct Caller {
     /// The key.

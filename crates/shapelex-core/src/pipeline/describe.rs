@@ -7,6 +7,7 @@ use crate::cancel::Cancel;
 use crate::memory::MemoryBudget;
 use crate::mesh::TriangleSoup;
 use crate::parameters::{Hypothesis, Parameters};
+use crate::ranking::View;
 
 /// Calls a function with memory that is not limited.
 fn unlimited<T>(cancel: &Cancel, describe: impl FnOnce(Within<'_>) -> T) -> T {
@@ -15,6 +16,22 @@ fn unlimited<T>(cancel: &Cancel, describe: impl FnOnce(Within<'_>) -> T) -> T {
         cancel,
         memory: &memory,
     })
+}
+
+/// Cleans a mesh, reserves the memory of its spectra, solves for them and takes the views.
+fn describe(
+    soup: TriangleSoup,
+    parameters: &Parameters,
+    role: Role,
+    within: Within<'_>,
+    observer: &dyn Fn(Stage),
+    views: impl FnOnce(&mut PreparedShape) -> Result<Vec<View>, PipelineError>,
+) -> Result<Description, PipelineError> {
+    let clean = CleanShape::new(soup, parameters, role, within, observer)?;
+    let _held = within.memory.hold(clean.bytes(parameters, within)?)?;
+    let mut shape = clean.solve(parameters, within.cancel, observer)?;
+    let views = views(&mut shape)?;
+    Ok(shape.into_description(views))
 }
 
 /// Describes a training shape: one view per channel of the parameters, `samples_per_shape` signatures each.
@@ -44,11 +61,9 @@ pub fn describe_shape_within(
     within: Within<'_>,
     observer: &dyn Fn(Stage),
 ) -> Result<Description, PipelineError> {
-    let clean = CleanShape::new(soup, parameters, Role::Training, within, observer)?;
-    let _held = within.memory.hold(clean.bytes(parameters, within)?)?;
-    let shape = clean.solve(parameters, within.cancel, observer)?;
-    let views = shape.training_views(parameters, within.cancel)?;
-    Ok(shape.into_description(views))
+    describe(soup, parameters, Role::Training, within, observer, |shape| {
+        shape.training_views(parameters, within.cancel)
+    })
 }
 
 /// Describes a query: one view per hypothesis (an open surface's doubling gives one per assumed area),
@@ -77,11 +92,9 @@ pub fn describe_query_within(
     within: Within<'_>,
     observer: &dyn Fn(Stage),
 ) -> Result<Description, PipelineError> {
-    let clean = CleanShape::new(soup, parameters, Role::Query, within, observer)?;
-    let _held = within.memory.hold(clean.bytes(parameters, within)?)?;
-    let mut shape = clean.solve(parameters, within.cancel, observer)?;
-    let views = shape.query_views(parameters, within.cancel)?;
-    Ok(shape.into_description(views))
+    describe(soup, parameters, Role::Query, within, observer, |shape| {
+        shape.query_views(parameters, within.cancel)
+    })
 }
 
 /// Describes a query for the baselines, which compare it with the plain view of training shapes: by that view alone, with
@@ -113,11 +126,9 @@ pub fn describe_plain_within(
 ) -> Result<Description, PipelineError> {
     let mut parameters = parameters.clone();
     parameters.hypotheses.retain(|h| *h != Hypothesis::Whitened);
-    let clean = CleanShape::new(soup, &parameters, Role::Training, within, observer)?;
-    let _held = within.memory.hold(clean.bytes(&parameters, within)?)?;
-    let shape = clean.solve(&parameters, within.cancel, observer)?;
-    let views = vec![shape.training_plain(&parameters)?];
-    Ok(shape.into_description(views))
+    describe(soup, &parameters, Role::Training, within, observer, |shape| {
+        Ok(vec![shape.training_plain(&parameters)?])
+    })
 }
 
 /// Describes one shape both as a training shape and as a query, from one spectrum: what an evaluation, in which every

@@ -15,7 +15,7 @@ pub enum AtDeadline {
 /// The end of a query's time. The core reads no clock: the caller sets the flag.
 #[derive(Clone, Debug, Default)]
 pub struct Deadline {
-    /// Set at the deadline, or where nobody waits for the answer any more.
+    /// Set at the deadline, and when the client has left.
     pub passed: Cancel,
     /// What is answered then.
     pub then: AtDeadline,

@@ -1,5 +1,5 @@
-//! The query: a mesh and an index → classes, ranked and judged. The service, the command line and the benchmarks all
-//! call [`QueryEngine::run`], so that there is one way to answer.
+//! The query: a mesh and an index → classes, ranked and judged. The service and the command line both call
+//! [`QueryEngine::run`].
 //!
 //! | step | from | to |
 //! |---|---|---|
