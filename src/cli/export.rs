@@ -58,26 +58,44 @@ fn from_store(data: &Path) -> Result<Exported, CliError> {
         .ok_or_else(|| CliError::at(data, "nothing is indexed yet; run `shapelex index DIR` first"))?;
     let mut index = store.load_index(&generation).map_err(failed)?;
     let mut baselines = store.load_baselines(&generation).map_err(failed)?;
-    let names: BTreeMap<String, String> = generation
-        .classes
-        .iter()
-        .map(|class| (class.class.to_string(), class.name.to_string()))
+    // As queries see it: without classes that were deleted since, and under the names of today.
+    let names: BTreeMap<String, String> = store
+        .list_classes(None, usize::MAX)
+        .map_err(failed)?
+        .into_iter()
+        .map(|class| (class.id.to_string(), class.name.to_string()))
         .collect();
-    for class in baselines.iter_mut().flat_map(|b| &mut b.classes) {
-        if let Some(name) = names.get(&class.label) {
-            class.label.clone_from(name);
-        }
+    if let Some(baselines) = &mut baselines {
+        baselines
+            .classes
+            .retain_mut(|class| match names.get(&class.label) {
+                Some(name) => {
+                    class.label.clone_from(name);
+                    true
+                }
+                None => false,
+            });
     }
     let mut classes = Vec::new();
     let mut reports = BTreeMap::new();
-    for (indexed, learnt) in index.classes.iter_mut().zip(&generation.classes) {
+    let mut dictionaries = Vec::new();
+    for (mut indexed, learnt) in index.classes.drain(..).zip(&generation.classes) {
+        let Some(name) = names.get(&indexed.label) else {
+            continue;
+        };
         // The index is labelled by identifiers, which mean nothing outside this data directory.
-        indexed.label = learnt.name.to_string();
+        indexed.label.clone_from(name);
+        dictionaries.push(indexed);
         classes.push(ExportedClass {
-            name: learnt.name.to_string(),
+            name: name.clone(),
             shapes: learnt.shapes,
         });
-        reports.insert(learnt.name.to_string(), learnt.report.clone());
+        reports.insert(name.clone(), learnt.report.clone());
+    }
+    index.classes = dictionaries;
+    if classes.is_empty() {
+        let detail = "every class of the index was deleted; run `shapelex index DIR` first";
+        return Err(CliError::at(data, detail));
     }
     Ok(Exported {
         index,

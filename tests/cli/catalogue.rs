@@ -328,3 +328,39 @@ fn without_a_service_nothing_is_said_about_requests() {
     let (_, told) = ended(path, 1, &["query", &file, "--data", "d"]);
     assert!(told.contains("`shapelex index DIR --data d`"), "{told}");
 }
+
+#[test]
+fn an_export_has_the_classes_and_names_of_today() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path();
+    small_zoo(path);
+    answer(path, &[&["index", "shapes"], &FAST[..]].concat());
+    let names = classes(path);
+    answer(path, &["classes", "rename", &names[0], "renamed"]);
+    answer(path, &["classes", "delete", &names[1], "--yes"]);
+    let (stdout, _) = ended(path, 0, &["export", "--out", "d.safetensors", "--json"]);
+    let exported = last_json(&stdout)["classes"].clone();
+    let mut found: Vec<&str> = (exported.as_array().unwrap().iter())
+        .map(|class| class["name"].as_str().unwrap())
+        .collect();
+    found.sort_unstable();
+    let mut expected = ["renamed", names[2].as_str()];
+    expected.sort_unstable();
+    assert_eq!(found, expected);
+    let file = first_file(path, &names[0]);
+    let query = ["query", &file, "--json", "--dictionaries", "d.safetensors"];
+    for by in [&[][..], &["--rank-by", "bag_of_words"]] {
+        let (stdout, _) = ended(path, 0, &[&query[..], by].concat());
+        let answered = last_json(&stdout);
+        let ranked = answered["classes"].as_array().unwrap();
+        assert_eq!(
+            (ranked.len(), &ranked[0]["class"]["name"]),
+            (2, &Value::from("renamed"))
+        );
+    }
+    for name in ["renamed", names[2].as_str()] {
+        answer(path, &["classes", "delete", name, "--yes"]);
+    }
+    let (_, told) = ended(path, 1, &["export", "--out", "none.safetensors"]);
+    assert!(told.contains("every class of the index was deleted"), "{told}");
+}
